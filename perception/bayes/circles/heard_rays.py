@@ -42,13 +42,6 @@ def try_other_rays(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind
     """Try the scratch's hypothesis, which failed, by other rays; return whether the place is heard so from now on.
 
     While one number leads, the bodies that fail are all tried by it.
-
-    Parameters
-    ----------
-    s, tracks, p
-        Memory and circles, updated, and settings.
-    kind : int
-        Index of the circle.
     """
     s[0].untried += 1
     if s[0].untried < OTHER_RAYS_EVERY:
@@ -176,13 +169,7 @@ def compare_rays(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
 
 @kernel
 def decide_rays(s: StateRecord, tracks: CircleTracks, p: SettingsRecord) -> None:
-    """Let the place be heard by that number of rays, if any, by which its objects together are likelier by far.
-
-    Parameters
-    ----------
-    s, tracks, p
-        Memory and circles, updated, and settings.
-    """
+    """Let the place be heard by that number of rays, if any, by which its objects together are likelier by far."""
     for k in range(RAYS_MAX + 1):
         lead = 0.0
         for t in range(len(tracks)):

@@ -76,15 +76,7 @@ def is_known(tracks: CircleTracks, p: SettingsRecord, x: float, y: float, shift:
 
 @kernel
 def relax_onto_map(s: StateRecord, p: SettingsRecord, kind: int) -> None:
-    """Move the scratch's hypothesis of a circle by relaxation (paper §3.4) onto the mapped segments that face it.
-
-    Parameters
-    ----------
-    s, p
-        Memory, updated, and settings.
-    kind : int
-        Index of the circle.
-    """
+    """Move the scratch's hypothesis of a circle by relaxation (paper §3.4) onto the mapped segments that face it."""
     scratch = s[0].scratch
     x, y = scratch.hypothesis.x, scratch.hypothesis.y
     radius = p[0].circles[kind].radius_m

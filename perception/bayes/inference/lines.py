@@ -219,15 +219,7 @@ def goes_through(line: Line, q: Reading, p: SettingsRecord, dot: float, foot: fl
 
 @kernel
 def update_lines(s: StateRecord, p: SettingsRecord, m: int) -> None:
-    """Associate fired readings with lines, correct the lines, and weaken those that a range goes through.
-
-    Parameters
-    ----------
-    s, p
-        Memory, updated, and settings.
-    m : int
-        Readings.
-    """
+    """Associate fired readings with lines, correct the lines, and weaken those that a range goes through."""
     var0, rel2 = noise_variance(s, p)
     scratch, half_box = s[0].scratch, p[0].half_resolution_m
     for k in range(MAX_LINES):

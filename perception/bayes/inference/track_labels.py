@@ -110,11 +110,6 @@ def merge_duplicates(tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
     """Merge a track with others in the same place: keep the one with more evidence, or the one that a user marked.
 
     A model that was reported, or confirmed, keeps its number, whichever of the two is older.
-
-    Parameters
-    ----------
-    tracks, p, t
-        Circles (updated), settings, and index of the track.
     """
     track = tracks[t]
     for k in range(len(tracks)):

@@ -55,15 +55,7 @@ def count_on_line(readings: Records[Reading], line: Line, cos_may: float, tight:
 
 @kernel
 def is_part_of_wall(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> bool:
-    """Return whether a polygon's track is part of a wall: it lies on a line that explains the job's readings as well.
-
-    Parameters
-    ----------
-    s, p
-        Memory and settings.
-    track : PolygonTrack
-        The track.
-    """
+    """Return whether a polygon's track is part of a wall: it lies on a line that explains its readings as well."""
     inner = p[0].polygons[track.model].inner_radius_m
     readings = s[0].job_readings[: s[0].job.reading_count]
     var0, rel2 = noise_variance(s, p)
@@ -151,13 +143,6 @@ def compare_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, tra
     """Update a polygon's probability against nothing, an unknown object and the circles in its place.
 
     Circles that are far less likely than an established polygon are removed.
-
-    Parameters
-    ----------
-    s, tracks, p
-        Memory and circles, updated, and settings.
-    track : PolygonTrack
-        Updated.
     """
     own = track.log_likelihood_ratio + p[0].model_prior_nat
     around = p[0].polygons[track.model].outer_radius_m + POLYGON_AROUND_M

@@ -119,13 +119,6 @@ def leave_to_next_neighbour(s: StateRecord, p: SettingsRecord, t: int) -> int:
 
     Where bodies almost touch, the echoes of one body's corner are outliers to the other and bias its pose; so does
     silence from what the neighbour hides.
-
-    Parameters
-    ----------
-    s, p
-        Memory, updated, and settings.
-    t : int
-        The track.
     """
     job = s[0].job
     u = job.next_step

@@ -102,13 +102,7 @@ def occupant(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float) 
 
 @kernel
 def relax_polygon(s: StateRecord, p: SettingsRecord, model: int) -> None:
-    """Move the scratch's hypothesis by the paper's relaxation (§3.4): the map's segments attract its sides.
-
-    Parameters
-    ----------
-    s, p, model
-        Memory (updated), settings, and index of the polygon.
-    """
+    """Move the scratch's hypothesis by the paper's relaxation (§3.4): the map's segments attract its sides."""
     scratch = s[0].scratch
     hypothesis = scratch.hypothesis
     outline = p[0].polygons[model]

@@ -71,13 +71,6 @@ def facing_side(s: StateRecord, sides: Records[PolygonSide], is_closed: bool) ->
     """Return the side that faces the job's readings most, at the pose of the job's middle, and its face, ±1.
 
     The face is −1 where the readings are on the inner side of an open outline.
-
-    Parameters
-    ----------
-    s : (1,) State
-        Memory.
-    sides, is_closed
-        The polygon.
     """
     job = s[0].job
     n = job.reading_count
@@ -157,13 +150,6 @@ def next_restart(s: StateRecord, p: SettingsRecord, t: int) -> None:
     """Begin the search at the next other maximum around the first one found; else search near the best.
 
     Restarts are the pose shifted along and across, turned, rolled onto its other sides, and the challenger's pose.
-
-    Parameters
-    ----------
-    s, p
-        Memory, updated, and settings.
-    t : int
-        The track.
     """
     track = s[0].polygons[t]
     middle = s[0].job.middle

@@ -86,11 +86,6 @@ def is_compared(track: CircleTrack, p: SettingsRecord) -> bool:
 
     With many readings a refinement compares one alternative only, and what was not compared weighs nothing: until the
     last one was, the probability is too high.
-
-    Parameters
-    ----------
-    track, p
-        The circle and the settings.
     """
     return bool(track.reservoir < p[0].compare_all_below or track.refinements > p[0].circle_count)
 

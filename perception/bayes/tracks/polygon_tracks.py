@@ -77,13 +77,6 @@ def update_polygon_status(s: StateRecord, p: SettingsRecord, track: PolygonTrack
     """Establish a track, make it tentative again, or end it.
 
     A track is established only after its covariance has been determined.
-
-    Parameters
-    ----------
-    s, p
-        Memory, updated, and settings.
-    track : PolygonTrack
-        Updated.
     """
     evidence = track.log_likelihood_ratio
     if (
@@ -110,13 +103,6 @@ def merge_polygons(s: StateRecord, p: SettingsRecord, t: int) -> None:
     """Leave one body in a place: merge twins, and of overlapping bodies keep an established and likelier one.
 
     A body that a user marked stays in any case.
-
-    Parameters
-    ----------
-    s, p
-        Memory, updated, and settings.
-    t : int
-        The track.
     """
     track = s[0].polygons[t]
     inner = p[0].polygons[track.model].inner_radius_m
@@ -177,15 +163,7 @@ def is_sure(track: PolygonTrack, p: SettingsRecord) -> bool:
 
 @kernel
 def judge_polygon(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
-    """Update a track's pose, evidence and status from the pose search.
-
-    Parameters
-    ----------
-    s, tracks, p
-        Memory and circles, updated, and settings.
-    t : int
-        The track.
-    """
+    """Update a track's pose, evidence and status from the pose search."""
     track = s[0].polygons[t]
     found = s[0].job.best
     track.log_likelihood_ratio = score_pose(s, p, track.model, found.x, found.y, found.heading)

@@ -303,15 +303,7 @@ def update_circle_status(track: CircleTrack, p: SettingsRecord) -> None:
 
 @kernel
 def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
-    """Refine track `t`: pose, evidence, alternatives, noise, probability and status.
-
-    Parameters
-    ----------
-    s, tracks, p
-        Memory and circles, updated, and settings.
-    t : int
-        The track.
-    """
+    """Refine track `t`: pose, evidence, alternatives, noise, probability and status."""
     track = tracks[t]
     n = copy_reservoir(track, s[0].scratch.readings)
     n = add_crosses(s, p, track.x, track.y, track.radius, s[0].scratch.readings, n)

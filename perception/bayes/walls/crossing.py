@@ -47,11 +47,6 @@ def crossing(a: Wall, b: Wall) -> tuple[bool, float, float]:
     """Return whether two walls would meet near their ends, and where their lines cross, m.
 
     Seen from where both are heard, one wall ends at the left of a corner and the other one begins at its right.
-
-    Parameters
-    ----------
-    a, b : Wall
-        The walls.
     """
     ax, ay = wall_normal(a)
     bx, by = wall_normal(b)

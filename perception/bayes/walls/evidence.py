@@ -183,13 +183,7 @@ def flatness(wall: Wall, first: int, end: int, p: SettingsRecord) -> tuple[float
 
 @kernel
 def judge(wall: Wall, p: SettingsRecord) -> None:
-    """Write the weights and the evidence of a fitted wall, and of each of its spans.
-
-    Parameters
-    ----------
-    wall, p
-        The wall, updated, and the settings.
-    """
+    """Write the weights and the evidence of a fitted wall, and of each of its spans."""
     for k in range(wall.span_count):
         span = wall.spans[k]
         span.weight = 0.0

@@ -56,13 +56,7 @@ def add_residual(room: WallMap, wall: Wall, error: float, along: float, range_m:
 
 @kernel
 def estimate_noise(s: StateRecord, p: SettingsRecord) -> None:
-    """Fit the variance a + b · r² to the squared errors by least squares, and weigh all bins by it where it changed.
-
-    Parameters
-    ----------
-    s, p
-        Memory, updated, and settings.
-    """
+    """Fit the variance a + b · r² to the squared errors by least squares; weigh all bins anew if it changed."""
     room = s[0].room
     variance_m2, relative = noise_variance(s, p)
     if room.firings == 0:

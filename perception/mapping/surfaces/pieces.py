@@ -265,15 +265,7 @@ def best_direction(cells: Records[SurfaceCell], counts: CellCounts, seed: int) -
 
 @kernel
 def grow(room: LocalMap, counts: CellCounts, seed: int) -> bool:
-    """Grow a straight piece from a cell, the map's last; return whether there is one, then it owns its cells.
-
-    Parameters
-    ----------
-    room, counts
-        The map, updated, and its counts.
-    seed : int
-        The cell.
-    """
+    """Grow a straight piece from a cell, the map's last; return whether there is one, then it owns its cells."""
     cells, sums = room.cells, counts.sums
     angle = best_direction(cells, counts, seed)
     seed_x, seed_y = offset_of(cells[seed].i), offset_of(cells[seed].j)
