@@ -21,9 +21,9 @@ from perception.kernel import Floats
 from perception.sensor_mounts import mounts_array, mounts_at
 
 STAND_STILL_M: Final = 2e-3
-"""A robot whose odometry shifts by less than this …"""
+"""A robot whose odometry shifts by less than this, and turns by less than `STILL_RAD`, stands."""
 STILL_RAD: Final = math.radians(0.2)
-"""… and turns by less than this stands."""
+"""Turn in `STAND_STILL_M`."""
 HALF_PATH_GATE_M: Final = 0.06
 """Half paths that differ by more from those over the surface's nearest point are of another surface. A wall's differ
 by 4 cm at the shortest range and the longest baseline."""

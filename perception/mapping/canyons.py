@@ -27,9 +27,9 @@ SURFACE_REACH_M: Final = 9.0
 WIDTH_MAX_M: Final = 5.0
 """Widest mouth of a canyon: what is wider is a room."""
 DEPTH_MIN_M: Final = 0.8
-"""Least depth of a canyon: what is shallower is a niche; …"""
+"""Least depth of a canyon: what is shallower is a niche."""
 DEPTH_SHARE: Final = 0.3
-"""… also as a share of its width."""
+"""Least depth of a canyon as a share of its width."""
 BACK_SHARE: Final = 0.7
 """At half its depth a canyon is still as wide as this share of its mouth: the corner of a room is none."""
 CLIPPED: Final = 1.25
@@ -48,24 +48,24 @@ ENDS_M: Final = 0.1
 """Posts of a gap are known within half of this each: a gap is closed if it is narrower than what the robot passes by
 this. Otherwise two drums reported at the corners of an open end are a back."""
 SHAPELESS_RADIUS_M: Final = 0.1
-"""Radius of what has a place but no known shape …"""
+"""Radius of what has a place but no known shape, and is none of `POINTS`."""
 POINTS: Final = ("edge", "inside corner")
-"""… but for these, which are points of walls: both posts of a doorway leave all its width."""
+"""Points of walls, which have no radius: both posts of a doorway leave all its width."""
 DIRECTION_STEP_RAD: Final = math.radians(5.0)
 NUDGE_RAD: Final = 1e-4
 """Directions just beside the end of a surface, so that no opening is missed between two directions."""
 CLEAR_M: Final = 0.3
 """A place nearer to a surface than this is none of the robot's."""
 SAME_MOUTH_M: Final = 1.0
-"""Mouths nearer to each other than this, …"""
+"""Mouths nearer to each other than this, of canyons that point alike by `SAME_MOUTH_RAD`, are of the same canyon."""
 SAME_MOUTH_RAD: Final = math.radians(40.0)
-"""… of canyons whose directions differ by less than this, are of the same canyon."""
+"""Difference of directions in `SAME_MOUTH_M`."""
 CANYONS_MAX: Final = 16
 """Canyons that are remembered at most."""
 DOUBT: Final = 0.6
-"""The probability of a canyon that is not found again falls by this factor, …"""
+"""Factor on the probability of a canyon that is not found again."""
 FORGOTTEN: Final = 0.3
-"""… down to where it is forgotten."""
+"""A canyon less probable than this is forgotten."""
 EVERY_FIRINGS: Final = 10
 """One place is examined after so many firings: half a second."""
 

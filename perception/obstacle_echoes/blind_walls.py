@@ -66,9 +66,9 @@ class BlindWall(Record):
     """Place of the ring at the last look, m."""
     y: Place
     missed_low: Annotated[float, Bound(0.0, WIDTH_RAD)]
-    """How much of the direction beams have missed since that look, rad: from its lower edge on, …"""
+    """How much of the direction beams have missed since that look, rad, from its lower edge on."""
     missed_high: Annotated[float, Bound(0.0, WIDTH_RAD)]
-    """… and up to its upper edge."""
+    """How much of it they have missed up to its upper edge, rad."""
 
 
 @kernel

@@ -242,7 +242,7 @@ class Looks(NamedTuple):
     """What the ring has seen lately."""
 
     bearings_rad: Floats
-    """(k,): where it looked, sensor by sensor, rad, and …"""
+    """(k,): where it looked, sensor by sensor, rad."""
     ages_s: Floats
     """(k,): how long ago, s."""
     sensor_ages_s: Floats

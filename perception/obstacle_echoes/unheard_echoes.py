@@ -54,12 +54,12 @@ class UnheardEcho(Record):
     """What is remembered of one sensor."""
 
     ring_x: Place
-    """Place of the ring when the sensor looked last, m, …"""
+    """Place of the ring when the sensor looked last, m."""
     ring_y: Place
     yaw: Place
-    """… its direction, rad, …"""
+    """Direction of the ring then, rad."""
     range_m: Place
-    """… and what it heard then, m; below zero for nothing."""
+    """What the sensor heard then, m; below zero for nothing."""
     state: Annotated[int, index_of(4)]
     """`NOT_KEPT`, `LEFT`, `KEPT` or `ALONE`."""
     x: Place

@@ -45,12 +45,12 @@ class Expected(Record):
     is_off: Flag
     """Whether it hears an echo elsewhere than where one is expected."""
     low: Place
-    """Between what ranges an echo is expected, m; below zero where silence is, …"""
+    """Between what ranges an echo is expected, m; below zero where silence is."""
     high: Place
     missed: Annotated[float, Bound(0.0, 1.0)]
-    """The share of an honest sensor's readings that are not as expected, …"""
+    """The share of an honest sensor's readings that are not as expected."""
     honest_nat: Annotated[float, FINITE]
-    """… and the logarithm of the density of what it reads."""
+    """The logarithm of the density of what an honest sensor reads."""
 
 
 @kernel

@@ -54,27 +54,27 @@ class EchoTrace(Record):
     repeated: SensorPlace
     """Where it repeated its reading first in that standstill."""
     repeated_nat: Annotated[float, POSITIVE]
-    """Evidence that it repeats an old reading, nat: of changes that were due, …"""
+    """Evidence that it repeats an old reading, nat, of changes that were due."""
     equal_nat: Annotated[float, POSITIVE]
-    """… and of readings that need not have changed, but had no reason to be equal to the bit."""
+    """The same of readings that need not have changed, but had no reason to be equal to the bit."""
     own: SensorPlace
-    """Where it made the reading first that it repeats, whatever the others do, …"""
+    """Where it made the reading first that it repeats, whatever the others do."""
     stuck_nat: Annotated[float, POSITIVE]
-    """… and the evidence that it alone is stuck, as far as changes were due, nat."""
+    """Evidence that it alone is stuck, as far as changes were due, nat."""
     heard: SensorPlace
     """The last echo."""
     agreed: Count
     """Echoes in succession, each of which was where the one before had led to expect it."""
     agreed_m: Annotated[float, PLACE]
-    """The last of these, m, …"""
+    """The last of these, m."""
     agreed_path_m: Place
-    """… and the ring's way until then, m."""
+    """The ring's way until that one, m."""
     silences: Count
     """Looks without an echo since the last echo."""
     anchor: SensorPlace
-    """The echo with which later ones of the same surface are compared …"""
+    """The echo with which later ones of the same surface are compared."""
     is_anchored: Flag
-    """… if there is one."""
+    """Whether there is such an echo."""
 
 
 class RingTrace(Record):
@@ -91,20 +91,20 @@ class RingTrace(Record):
     standstill: Count
     """Number of the present standstill of the readings; a reading that changes ends it."""
     repeated_nat: Annotated[float, POSITIVE]
-    """Evidence that the ring repeats old readings, nat: of all its sensors, …"""
+    """Evidence that the ring repeats old readings, nat, of all its sensors and changes that were due."""
     equal_nat: Annotated[float, POSITIVE]
-    """… likewise."""
+    """The same of readings that need not have changed."""
     noise_nat: Annotated[float, POSITIVE]
     """Evidence that its ranges have noise, from readings at a standstill, nat."""
     missed_nat: Annotated[Floats, HALVES, POSITIVE]
     """Evidence that readings do not depend on what is there, nat."""
     silent: Count
-    """Of the misses in that evidence, those without an echo, …"""
+    """Of the misses in that evidence, those without an echo."""
     elsewhere: Count
-    """… and those with an echo elsewhere."""
+    """Of the misses in that evidence, those with an echo elsewhere."""
     turned_nat: Annotated[Floats, QUARTERS, FINITE]
     """Evidence that the ring is mounted turned by so many quarters, nat."""
     misses: Annotated[Floats, LOOK_KINDS, POSITIVE]
-    """Looks of each kind that missed a known echo, …"""
+    """Looks of each kind that missed a known echo."""
     looks: Annotated[Floats, LOOK_KINDS, POSITIVE]
-    """… and all of them."""
+    """All looks of each kind."""

@@ -64,16 +64,16 @@ MOVES: Final = 1.2
 MISSED: Final = 0.9
 """Share of looks that miss a known echo, if readings do not depend on what is there."""
 HONEST_MISS_MIN: Final = 0.04
-"""An honest ring misses no less of its known echoes than this share: all surfaces end, …"""
+"""An honest ring misses no less of its known echoes than this share: all surfaces end."""
 HONEST_MISS_MAX: Final = 0.6
-"""… and no more than this one: some are heard."""
+"""An honest ring misses no more of its known echoes than this share: some are heard."""
 STEADY, TURNING, AGAIN, DOUBTED = range(LOOK_KINDS)
 """Kinds of looks: at an echo that agreed with the one before, from the same direction or another; the second look at
 one that was missed; and at one that agreed with nothing. After that, silence is as honest: it was a stray."""
 HONEST_MISSES: Final = (2.0, 8.0, 8.0, 10.0)
-"""Misses of each kind that stand for what is known of rings before a run, …"""
+"""Misses of each kind, among `HONEST_LOOKS`, that stand for what is known of rings before a run."""
 HONEST_LOOKS: Final = 20.0
-"""… in so many looks."""
+"""Looks that stand for what is known of rings before a run."""
 MEMORY_LOOKS: Final = 500.0
 """Looks over which the rates of misses are learned; older ones count half."""
 
@@ -87,11 +87,11 @@ LEAN_RAD: Final = 0.15
 
 NOTHING, REPEATED, VANISHED, SCATTERED, TURNED = range(5)
 """What `check_motion` returns: nothing is wrong; the ring repeats old readings; most known echoes have gone
-silent, or are elsewhere; `TURNED` plus 0 to 2: it is turned by a quarter, two or three, …"""
+silent, or are elsewhere; `TURNED` plus 0 to 2: it is turned by a quarter, two or three."""
 CHANGED: Final = TURNED + QUARTERS - 1
-"""… and this plus one of the changes of `perception.ring_faults.changes`; …"""
+"""This plus one of the changes of `perception.ring_faults.changes`: the ring has changed so."""
 STUCK_SENSOR: Final = CHANGED + EXCHANGED + 1
-"""… and this plus the number of a sensor that repeats its reading while no other one hears anything new."""
+"""This plus the number of a sensor that repeats its reading while no other one hears anything new."""
 
 
 @kernel

@@ -24,11 +24,12 @@ CHATTER_SHARE: Final = 0.002
 """A range varies by at least this share of it from look to look, also where a wall along the path answers."""
 EQUAL_PRIOR: Final = 2e-8
 """Odds that an honest ring is without such noise, as that of an emulator between walls may be: equal readings alone
-fall short of `motion_tests.EVIDENCE_NAT` by one change that was due, …"""
+fall short of `motion_tests.EVIDENCE_NAT` by one change that was due. They suffice once its noise is known."""
 NOISY_NAT: Final = math.log(0.5 / 0.02)
+"""Evidence for noise of a reading that changed by more than its resolution although the sensor hardly moved, nat:
+half do so with noise, and two of a hundred without, as what is there may move."""
 EQUAL_NAT: Final = math.log(0.5 / 0.98)
-"""… unless its noise is known: of the readings between which the sensor hardly moves, half change by more than their
-resolution with noise, and two of a hundred without, as what is there may move. The evidence of each reading, nat."""
+"""Evidence for noise of a reading that did not change so, nat."""
 SENSOR_NAT: Final = REPEATS_MAX * REPEAT_NAT
 """Greatest evidence of a sensor, nat."""
 WINDING_NAT: Final = math.log(1.0 / 0.05)

@@ -36,12 +36,13 @@ named, and 24 with this."""
 HEARD_ALIKE_M: Final = 0.08
 """Echoes from such places that differ by no more are of the same object, m."""
 AGREES: Final = 0.45
-"""Of an honest sensor's looks where another heard an echo, the share that hears the same, …"""
+"""Of an honest sensor's looks where another heard an echo, the share that hears the same."""
 SILENT_WHERE_HEARD: Final = 0.3
-"""… and the share that hears none; where the other heard none, …"""
+"""Of these looks the share that hears none."""
 SILENT_TOO: Final = 0.75
-"""… the share that does not either. In eight drives of a minute, of four robots, they were .83 and .11 of 1,459 looks
-and .91 of 1,958; they are taken for less, as looks in succession are alike."""
+"""Of an honest sensor's looks where another heard no echo, the share that hears none. In eight drives of a minute, of
+four robots, it was .91 of 1,958; and the two above were .83 and .11 of 1,459. They are taken for less, as looks in
+succession are alike."""
 
 
 class Wiring(NamedTuple):

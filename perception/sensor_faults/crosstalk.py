@@ -15,13 +15,14 @@ from perception.sensor_faults.memory import RingMemory, SensorMemory
 REGULARITY_GAIN: Final = 0.05
 """Weight of the newest firing in the regularity of the firing pattern."""
 SHORT_M: Final = 0.15
-"""Crosstalk: a reading is short if it is below those before and after it by this, m, …"""
+"""Crosstalk: a reading is short if it is below those before and after it by this, m, and by `SHORT_SHARE` of them."""
 SHORT_SHARE: Final = 0.05
-"""… and by this share of them."""
+"""Share of the other readings in `SHORT_M`."""
 DOUBT_M: Final = 0.06
-"""A single reading is doubted if it is below the last one of another set by this, m: two quantisation steps, …"""
+"""A single reading is doubted if it is below the last one of another set by this, m: two quantisation steps."""
 DOUBT_SHARE: Final = 0.02
-"""… and by this share, for noise. A wrong doubt costs a firing, a wrong mask a sensor: that one has wider limits."""
+"""It must also be below by this share, for noise. A wrong doubt costs a firing, a wrong mask a sensor: that one has
+wider limits."""
 SHORT_READINGS_MAX: Final = 8.0
 """Short readings that are crosstalk; each other reading subtracts two."""
 

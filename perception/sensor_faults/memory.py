@@ -97,9 +97,9 @@ class SensorMemory(Record):
     heard_looks: Count
     """Number of the next look when the sensor heard its last echo."""
     audible: Count
-    """Looks at something that others heard from both sides, …"""
+    """Looks at something that others heard from both sides."""
     misses: Count
-    """… and those of them without an echo."""
+    """Those of these looks that have no echo."""
     deaf_looks: Count
     """Of the latter, those since the last echo that are unlike the one before them."""
     deaf_x: Place
@@ -118,20 +118,20 @@ class RingMemory(Record):
     """Place of the last firing, m."""
     y: Place
     turn_x: Place
-    """Place where it began to turn in place, m, …"""
+    """Place where it began to turn in place, m."""
     turn_y: Place
     turn_firing: Count
-    """… the firing with which that began, …"""
+    """The firing with which that turn began."""
     turned: Place
-    """… by how much it has turned since, counter-clockwise, rad, …"""
+    """How much it has turned since, counter-clockwise, rad."""
     turn_yaw: Place
-    """… and its direction at the last firing, rad."""
+    """Its direction at the last firing, rad."""
     regularity: Share
     """Recent share of firings whose set was known."""
     audible: Count
-    """Looks of all sensors at something that others heard from both sides, …"""
+    """Looks of all sensors at something that others heard from both sides."""
     misses: Count
-    """… and those of them without an echo."""
+    """Those of these looks that have no echo."""
 
 
 class RingSetup(NamedTuple):

@@ -23,9 +23,9 @@ from perception.sensor_faults.memory import LOOKS_KEPT, RingMemory, SensorLook, 
 DEAF_NAT: Final = math.log(1e8)
 """Evidence that names a sensor, nat: a day has some 10⁵ such looks of each of two dozen sensors."""
 HEALTHY_MISSES: Final = 3.0
-"""Misses that stand for what is known of healthy sensors before a run, …"""
+"""Misses, among `HEALTHY_LOOKS`, that stand for what is known of healthy sensors before a run."""
 HEALTHY_LOOKS: Final = 10.0
-"""… among so many looks."""
+"""Looks that stand for what is known of healthy sensors before a run."""
 HEALTHY_MISS_MIN: Final = 0.2
 """A healthy sensor misses no less than this: the looks at one object are alike."""
 LOOKS_APART_M: Final = 0.1

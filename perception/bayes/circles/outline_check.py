@@ -24,9 +24,9 @@ from perception.bayes.memory.state import CircleTrack, StateRecord
 from perception.kernel import kernel
 
 OUTLINE_SIGMA_M: Final = 0.05
-"""Deviation of an unknown outline from a model's, that of boxes of its size, …"""
+"""Deviation of an unknown outline from a model's: that of boxes of its size."""
 OUTLINE_SCALE_RAD: Final = 0.45
-"""… and the bearing over which it changes."""
+"""Bearing over which that deviation changes."""
 OUTLINE_SURFACE_M: Final = 0.005
 """Deviation of a model's own surface, and of the poses from which it was heard."""
 OUTLINE_READINGS_MIN: Final = 3
@@ -34,9 +34,9 @@ OUTLINE_READINGS_MIN: Final = 3
 OUTLINE_BEARINGS_MIN: Final = 4
 """Least bearings: two of them are needed for the place, and a third has an outlier now and then."""
 OTHER_RADIUS_SIGMA_M: Final = 0.2
-"""Deviation of other round bodies' radii from a model's; …"""
+"""Deviation of other round bodies' radii from a model's."""
 OTHER_RADIUS_SAME_M: Final = 0.015
-"""… below this a radius is the model's own."""
+"""With a smaller deviation a radius is the model's own."""
 OTHER_RADIUS_ERROR_M: Final = 0.04
 """Greatest standard deviation at which a radius is compared; before that the rivals suffice."""
 BIN_RAD: Final = math.tau / BEARING_BINS

@@ -18,9 +18,9 @@ from perception.records import Records
 from perception.relaxation import relax
 
 X_PRIME: Final = 73856093
-"""Factor of a cell's column in the spatial hash of Teschner et al., Optimized Spatial Hashing (VMV 2003), §3 …"""
+"""Factor of a cell's column in the spatial hash of Teschner et al., Optimized Spatial Hashing (VMV 2003), §3."""
 Y_PRIME: Final = 19349663
-"""… and of its row, both primes."""
+"""Factor of a cell's row in the same hash."""
 
 
 @kernel

@@ -79,9 +79,9 @@ class PolygonJob(Record):
     kind: Annotated[int, Bound(NO_JOB, REFINEMENT)]
     stage: Annotated[int, up_to(LATTICE)]
     track: Annotated[int, index_of(MAX_POLYGONS)]
-    """The track that is refined, or …"""
+    """The track that a job of refinement works on."""
     model: Annotated[int, index_of(POLYGONS_MAX)]
-    """… the model that is tried."""
+    """The model that another job tries."""
     reading_count: Annotated[int, up_to(JOB_READINGS)]
     reading_step: Annotated[int, up_to(JOB_READINGS)]
     """Step between the readings that a search scores."""

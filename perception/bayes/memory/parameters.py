@@ -37,9 +37,9 @@ TABLE_SIGMAS_M: Final = (0.001 * FOOT_M, 0.6 * FOOT_M)
 TABLE_REACH_SIGMAS: Final = 6.0
 """Distance beyond the box of rounding, in σ, at which only outliers remain."""
 DROP_OUT_SHARE: Final = 0.2
-"""Drop-outs are a matter of the sensor up to this share of what should have hit (and one more) …"""
+"""Up to this share of what should have hit, and one more, drop-outs are a matter of the sensor."""
 DROP_OUT_NAT: Final = 2.0
-"""… and each further one costs this much more: many drop-outs indicate an absent body."""
+"""Price of each further drop-out: many of them indicate an absent body."""
 
 # --- Noise of the ranges -------------------------------------------------------------------------------------------
 
@@ -69,22 +69,22 @@ RANGE_VARIANCE_MIN_M2: Final = 1e-6 * FOOT_M * FOOT_M
 EXPLAINED_ERROR_SIGMAS: Final = 3.0
 """Greatest error of an explained range, in σ, beyond half its rounding; farther ones count as that far in a mean."""
 RESIDUAL_HITS_MIN: Final = 25.0
-"""A certain object's residuals count from this many hits on, …"""
+"""A certain object's residuals count from this many hits on."""
 RESIDUAL_EVERY: Final = 3
-"""… and in every third of its refinements."""
+"""They count in one of so many of its refinements."""
 
 # --- Which readings are kept and attributed ------------------------------------------------------------------------
 
 HISTORY_SPACING_M: Final = 0.2 * FOOT_M
 """Least distance between consecutive readings of a sensor's history."""
 STILL_M: Final = 0.05 * FOOT_M
-"""A reading is redundant if its range is the same and its sensor moved less than this …"""
+"""A sensor that moved less than this, and turned less than `STILL_COS`, repeats an equal range."""
 STILL_COS: Final = 0.9998
-"""… and turned less than by this cosine (1°)."""
+"""Cosine of the turn in `STILL_M`: 1°."""
 ASSOCIATION_MARGIN_M: Final = 0.004 * FOOT_M
-"""Distance outside a beam at which a centre may lie for the reading to be associated …"""
+"""Distance outside a beam at which a centre may lie for the reading to be associated with the object."""
 KEEPING_MARGIN_M: Final = 0.01 * FOOT_M
-"""… and for it to be kept in the object's reservoir."""
+"""Distance outside a beam at which a centre may lie for the reading to be kept in the object's reservoir."""
 HYPOTHESIS_MARGIN_M: Final = 0.02 * FOOT_M
 """A hypothesis' centre this far outside a beam may still move into it during the fit."""
 
@@ -99,13 +99,13 @@ PAIR_GAP_S: Final = 30.0
 BASELINE_MIN_M: Final = 0.5 * FOOT_M
 """Shortest baseline of one sensor; the longer ones are twice and four times this."""
 BASELINES: Final = 3
-"""Number of baselines that are tried, …"""
+"""Number of baselines that are tried."""
 BASELINE_MAX_M: Final = 2.6 * FOOT_M
-"""… and the longest."""
+"""Longest baseline that is tried."""
 NEIGHBOUR_BASELINE_MIN_M: Final = 0.3 * FOOT_M
-"""Shortest baseline of neighbours that did not fire together …"""
+"""Shortest baseline of neighbours that did not fire together."""
 NEIGHBOUR_BASELINE_MAX_M: Final = 1.0 * FOOT_M
-"""… and the longest."""
+"""Longest baseline of neighbours that did not fire together."""
 MAPPED_LENGTH_MIN_M: Final = 0.2 * FOOT_M
 """Least length of a mapped segment: a shorter one's direction is too uncertain for the relaxation."""
 HYPOTHESIS_SIGMA_MAX_M: Final = 0.7 * FOOT_M
@@ -119,17 +119,17 @@ PARALLEL_COS: Final = 0.98
 """Two lines or segments are parallel from this cosine (11°) on: lines that are may be one, segments make the same
 request."""
 LINE_SAME_M: Final = 0.4 * FOOT_M
-"""A parallel new line is a known one if it lies this near to it, across …"""
+"""Greatest distance, across, of a parallel new line from a known one that is the same."""
 LINE_JOIN_M: Final = 1.0 * FOOT_M
-"""… and no farther beyond its ends than this."""
+"""Greatest distance beyond the ends of a known line at which a parallel new one is the same."""
 LINE_ANGLE_VARIANCE_RAD2: Final = 0.02
-"""Variance of a new line's direction, rad²: a standard deviation of 8° …"""
+"""Variance of a new line's direction, rad²: its standard deviation is 8°."""
 LINE_DISTANCE_VARIANCE_M2: Final = 0.01 * FOOT_M * FOOT_M
-"""… and of its distance."""
+"""Variance of a new line's distance from its origin."""
 LINE_ANGLE_DRIFT_RAD2: Final = 1e-8
-"""Variance that each echo adds to the direction, rad², so that the line keeps following, …"""
+"""Variance of a line's direction that each echo adds, rad², so that the line keeps following."""
 LINE_DISTANCE_DRIFT_M2: Final = 1e-6 * FOOT_M * FOOT_M
-"""… and to the distance."""
+"""Variance of a line's distance that each echo adds."""
 LINE_FRONT_COS: Final = 0.8
 """Least cosine between a sensor's axis and a line's normal at which it observes the line."""
 LINE_SLACK_M: Final = 0.02 * FOOT_M
@@ -139,29 +139,29 @@ LINE_GROW_M: Final = 0.5 * FOOT_M
 LINE_SILENCE_WITHIN_M: Final = 0.2 * FOOT_M
 """Silence counts this far inside its ends."""
 LINE_EDGE_SLACK_M: Final = 0.05 * FOOT_M
-"""More slack of an explained range for echoes from where a beam's edge meets the line, …"""
+"""Further slack of a range that a line explains where a beam's edge meets it."""
 LINE_EDGE_GROW_M: Final = 0.7 * FOOT_M
-"""… their growth, …"""
+"""A line grows by such echoes this far beyond its ends."""
 LINE_EDGE_COS: Final = 0.1
-"""… which count up to this cosine beyond the beam's edge."""
+"""Such echoes count up to this cosine beyond the beam's edge."""
 LINE_START_LOG_ODDS: Final = 3.0
-"""Log odds of a new line, …"""
+"""Log odds of a new line."""
 LINE_LOG_ODDS_MAX: Final = 6.0
-"""… of any line, …"""
+"""Greatest log odds of a line."""
 LINE_ECHO_LOG_ODDS: Final = 0.5
-"""… and what an echo adds to them."""
+"""What an echo adds to a line's log odds."""
 LINE_LENGTH_MIN_M: Final = 0.8 * FOOT_M
-"""Least length of a line that is kept, …"""
+"""Least length of a line that is kept."""
 NEW_LINE_HITS_MIN: Final = 8.0
-"""… and its least hits."""
+"""Least hits of a new line that is kept."""
 REPLACING_LINE_HITS_MIN: Final = 6.0
 """Least hits of a line that is kept when it replaces a circle."""
 ASSOCIATING_LINE_M: Final = 4.0 * FOOT_M
 """Least length of a line that takes readings from other explanations."""
 WALL_ECHOES_MIN: Final = 10.0
-"""A line that explained more echoes than this …"""
+"""A wall is a line that explained more echoes than this."""
 WALL_LENGTH_MIN_M: Final = 2.0 * FOOT_M
-"""… and is longer than this is called a wall."""
+"""A wall is a line longer than this."""
 
 # --- New circle tracks ---------------------------------------------------------------------------------------------
 
@@ -183,9 +183,9 @@ OTHER_FIT_STEPS: Final = 4
 """Steps of the relaxation and of the fits of a circle that has no track yet, and of an explanation other than a
 track's own."""
 CIRCLE_RESTS_RAD: Final = 0.005
-"""A circle's relaxation ends with turns below this …"""
+"""A circle's relaxation ends with turns below this and shifts below `CIRCLE_RESTS_M`."""
 CIRCLE_RESTS_M: Final = CIRCLE_RESTS_RAD * FOOT_M
-"""… and shifts below what such a turn makes a foot away."""
+"""The shift that a turn by `CIRCLE_RESTS_RAD` makes a foot away."""
 FIT_SOFTNESS: Final = 9.0
 """Robustness of the fits: squared residual, in σ², at which the weight has fallen to a quarter."""
 FIRST_FIT_SOFTNESS: Final = 16.0
@@ -201,9 +201,9 @@ FIT_TURN_MAX_RAD: Final = 0.2
 FIT_TURN_MIN_RAD: Final = 1e-5
 """A turn below this ends a line's fit."""
 CIRCLE_READINGS_MIN: Final = 5
-"""Least readings of a new track …"""
+"""Least readings of a new track."""
 CIRCLE_EVIDENCE_MIN_NAT: Final = 10.0
-"""… and its least evidence."""
+"""Least evidence of a new track."""
 SWITCH_LEAD_NAT: Final = 6.0
 """Lead required of another explanation: of a circle or a line over a circle, of an unknown object, at which a track
 ends, and of an established polygon over a circle in its place."""
@@ -225,19 +225,19 @@ DISPERSION_MIN: Final = 0.0015
 DOUBTED_DISPERSION_SHARE: Final = 0.5
 """An established track is tentative again below this share of the least dispersion."""
 FAR_M: Final = 6.0 * FOOT_M
-"""Distance beyond which an object's prior as a model falls, if it was heard only from there, …"""
+"""The prior of an object as a model falls with the distance beyond this, if it was heard only from there."""
 FAR_NAT_PER_M: Final = 2.0 / FOOT_M
-"""… and how fast it falls."""
+"""How fast that prior falls."""
 TRACK_READINGS_MIN: Final = 3
 """A track with fewer readings ends."""
 TRACK_FIT_STEPS: Final = 2
-"""Steps of the fit that precedes the posterior, …"""
+"""Steps of the fit that precedes the posterior of an established track."""
 TENTATIVE_FIT_STEPS: Final = 3
-"""… and of that of a tentative track."""
+"""Steps of the fit that precedes the posterior of a tentative track."""
 FIT_LEAD_SIGMAS2: Final = 6.0
-"""A robust fit this many σ² off replaces the pose, …"""
+"""A robust fit this many σ² off replaces the pose."""
 FITTED_REFINEMENTS: Final = 2
-"""… and so does every fit of this many first refinements."""
+"""Every robust fit of so many first refinements replaces the pose."""
 LOST_NAT: Final = 2.0
 """Loss of evidence at the mean, against the start, at which it has left the beams that heard the object."""
 ROOT_CORRELATION_MAX: Final = 0.9
@@ -249,36 +249,36 @@ SWITCH_UNSEEN: Final = 4
 CORNER_MISS_SHARE: Final = 0.5
 """Share of the evidence of missed echoes against the circle that also counts against a corner."""
 CIRCLE_WALL_BEYOND_M: Final = 8.0 * FOOT_M
-"""A centre lies in a wall up to this far beyond its ends, …"""
+"""A centre may lie in a wall up to this far beyond its ends."""
 CIRCLE_WALL_BEHIND: Final = -0.85
-"""… from this many radii on (negative: behind the wall's face) …"""
+"""A centre lies in a wall from so many radii on before its face; a negative number is behind it."""
 WALL_FRONT_RADII: Final = 0.7
-"""… to this many radii before the face; …"""
+"""A centre lies in a wall up to so many radii before its face."""
 IN_WALL_NAT: Final = -8.0
-"""… log prior of such a body."""
+"""Log prior of a body whose centre lies in a wall."""
 ESTABLISH_PROBABILITY: Final = 0.7
-"""Least probability at which a track is established, …"""
+"""Least probability of a track that is established."""
 ESTABLISH_HITS: Final = 8.0
-"""… least hits, …"""
+"""Least hits of a track that is established."""
 ESTABLISH_ROOT_M: Final = 0.25 * FOOT_M
-"""… and greatest standard deviation."""
+"""Greatest standard deviation of a track that is established."""
 DOUBT_PROBABILITY: Final = 0.2
 """Probability below which an established track is tentative again."""
 APART_RADII: Final = 0.8
 """Two centres nearer than this many of the larger radius are one object: bodies do not overlap."""
 LATERAL_PLACES: Final = 3
-"""Positions on either side that are tried, …"""
+"""Positions that are tried on either side."""
 LATERAL_STEP_M: Final = 0.12 * FOOT_M
-"""… and their spacing: together half a foot, a beam's edge at two and a half feet."""
+"""Distance of these positions: together half a foot, a beam's edge at two and a half feet."""
 ELSEWHERE_LEAD_NAT: Final = 1.0
 """Evidence by which another position, or another maximum of a polygon, must lead; a smaller lead is chance."""
 
 # --- The corner as an explanation ----------------------------------------------------------------------------------
 
 CORNER_READINGS_MIN: Final = 8
-"""Least number of readings of two faces …"""
+"""Least number of readings of two faces together."""
 CORNER_FACE_READINGS_MIN: Final = 3
-"""… and of one face: two to fix it and one to test it."""
+"""Least number of readings of one face: two to fix it and one to test it."""
 CORNER_ROUNDS: Final = 3
 """Rounds of assigning readings to the faces and fitting both, and steps of each fit."""
 CORNER_LEEWAY_COS: Final = 0.02
@@ -303,9 +303,9 @@ GRID_NEGLIGIBLE_NAT: Final = 30.0
 GRID_OFF_CENTRE: Final = 1.2
 """The grid is laid again when the mean is this many pitches off its middle."""
 GRID_NARROW: Final = 0.3
-"""Variance, in squared pitches, below which the grid is too coarse: 1 is as expected; …"""
+"""Variance, in squared pitches, below which the grid is too coarse: 1 is as expected."""
 GRID_WIDE: Final = 2.2
-"""… and beyond which it is too small."""
+"""Variance, in squared pitches, above which the grid is too small."""
 GRID_THINNEST: Final = 0.06
 """Least variance, in squared pitches, that the next grid assumes: a narrower peak falls between the cells."""
 GRID_CORRELATION_MAX: Final = 0.95
@@ -318,9 +318,9 @@ GRID_SIGMA_MIN_GATES: Final = 2e-4
 # --- Which tracks are reported, and how ----------------------------------------------------------------------------
 
 NAMED_OVER_UNKNOWN: Final = 1.25
-"""Least ratio of the evidence to that of an unknown object for a name, …"""
+"""Least ratio of a named object's evidence to that of an unknown one."""
 NAMED_OVER_UNKNOWN_ALONE: Final = 1.1
-"""… less where every alternative is far behind."""
+"""The same ratio where every alternative is far behind."""
 ALONE_LEAD_NAT: Final = -20.0
 """Lead of the best alternative at which it counts as far behind."""
 NO_WALL_LEAD_NAT: Final = -4.0
@@ -367,9 +367,9 @@ REJECTED_MAX_NAT: Final = 40.0
 PLACED_ROUNDS: Final = 3
 """Relaxations of a placed model onto the map, a few steps each."""
 PLACED_STRAY_MAX_M: Final = 0.5
-"""Greatest shift of a placed model by a relaxation, …"""
+"""Greatest shift of a placed model by a relaxation: one that moves farther has found something else."""
 PLACED_STRAY_MAX_RAD: Final = 0.8
-"""… and its greatest turn: one that moves farther has found something else."""
+"""Greatest turn of a placed model by a relaxation."""
 
 # --- Which track is refined next -----------------------------------------------------------------------------------
 
@@ -380,11 +380,11 @@ IDLE_FIRINGS: Final = 12
 FINAL_REFINEMENTS: Final = 6
 """Number of final refinements of an idle track."""
 UNSURE_FACTOR: Final = 4.0
-"""Factor on the evidence of an object that is refined earlier, …"""
+"""Factor on the evidence of an object that is not certain, so that it is refined earlier."""
 UNSURE_ROOT_M: Final = 0.03 * FOOT_M
-"""… as its position is less certain than this, and perhaps wrong, …"""
+"""An object is not certain if its position is less certain than this, and perhaps wrong."""
 CERTAIN_PROBABILITY: Final = 0.95
-"""… or of an object less probable than this."""
+"""An object less probable than this is not certain."""
 RESERVOIR_OFFSET: Final = 8.0
 """Readings added to an object's count, so that an object with few is not refined at every reading."""
 FINAL_VALUE: Final = 1e-6

@@ -41,27 +41,27 @@ SEARCH_FINEST_M: Final = 0.005 * FOOT_M
 SEARCH_EVERY: Final = 4
 """A pose whose covariance is known and that explains its readings is searched only once in this many refinements."""
 WIDE_SEARCHES_FIRST: Final = 4
-"""The search is wide in this many first refinements, …"""
+"""The search is wide in so many first refinements."""
 WIDE_SEARCH_EVERY: Final = 8
-"""… then once in this many, …"""
+"""After these the search is wide in one of so many refinements."""
 FITTING_SHARE: Final = 0.85
-"""… and every other time while less than this share of the near readings is explained."""
+"""The search is wide every other time while less than this share of the near readings is explained."""
 COARSE_READINGS: Final = 96
 """Greatest number of readings that a wide search scores."""
 WIDE_STEP_M: Final = 0.3 * FOOT_M
-"""First step of a wide search …"""
+"""First step of a wide search."""
 WIDE_ROUNDS: Final = 14
-"""… and its rounds."""
+"""Rounds of a wide search."""
 NARROW_STEP_M: Final = 0.05 * FOOT_M
-"""First step of a search near by …"""
+"""First step of a search near by."""
 NARROW_ROUNDS: Final = 6
-"""… and its rounds."""
+"""Rounds of a search near by."""
 RESTART_SHIFTS: Final = (0.5, -0.5, 1.0, -1.0)
-"""Shifts of the restarts along and across, in inner radii, …"""
+"""Shifts of the restarts along and across, in inner radii."""
 RESTART_TURNS: Final = (-0.5, 0.5)
-"""… turns, in π over the order of the symmetry, …"""
+"""Turns of the restarts, in π over the order of the symmetry."""
 RESTART_ROLLS_MAX: Final = 12
-"""… and greatest number of other sides that they are rolled onto."""
+"""Greatest number of other sides that restarts are rolled onto."""
 RESTART_ROUNDS: Final = 5
 """Rounds of the restarts' searches, which begin with `FINE_STEP_M`."""
 
@@ -72,11 +72,11 @@ REQUEST_SAME_M: Final = 0.25 * FOOT_M
 POLYGON_AROUND_M: Final = 0.3 * FOOT_M
 """Segments up to this far off the farthest vertex may attract the body; circles up to there stand in its place."""
 POLYGON_RELAXATION_STEPS: Final = 3
-"""Greatest number of a polygon's relaxation steps; …"""
+"""Greatest number of a polygon's relaxation steps."""
 POLYGON_RESTS_RAD: Final = 0.01
-"""… they end with turns below this …"""
+"""These steps end with turns below this and shifts below `POLYGON_RESTS_M`."""
 POLYGON_RESTS_M: Final = POLYGON_RESTS_RAD * FOOT_M
-"""… and shifts below what such a turn makes a foot away."""
+"""The shift that a turn by `POLYGON_RESTS_RAD` makes a foot away."""
 SIDE_SHIFTS: Final = (-0.3, 0.0, 0.3)
 """Where on a side the segment is laid, from its middle, in lengths of the side."""
 TRIAL_READINGS_MIN: Final = 8
@@ -84,73 +84,73 @@ TRIAL_READINGS_MIN: Final = 8
 TRIAL_READINGS_MAX: Final = 80
 """Greatest number of readings that a trial scores: it is only compared with the other trials."""
 TRIAL_STEP_M: Final = 0.2 * FOOT_M
-"""First step of a trial's search …"""
+"""First step of a trial's search."""
 TRIAL_ROUNDS: Final = 8
-"""… and its rounds."""
+"""Rounds of a trial's search."""
 TRIAL_EVIDENCE_MIN_NAT: Final = 15.0
 """Least evidence of the best trial."""
 FINE_STEP_M: Final = 0.1 * FOOT_M
-"""First step of the search from the best trial …"""
+"""First step of the search from the best trial, and of those of restarts."""
 FINE_ROUNDS: Final = 10
-"""… and its rounds."""
+"""Rounds of the search from the best trial."""
 POLYGON_HITS_MIN: Final = 6.0
 """Least hits of a new track."""
 WHOLE_SHARE: Final = 0.9
-"""A track that explains this share of its near readings keeps its place …"""
+"""A track that explains this share of its near readings keeps its place."""
 APART_WHOLE: Final = 1.5
-"""… and no like track starts this near, in inner radii; …"""
+"""No like track starts this near to one that keeps its place, in inner radii."""
 POLYGONS_APART: Final = 0.5
-"""… for any other track this near."""
+"""No like track starts this near to any other track, in inner radii."""
 CHALLENGE_UNSEEN: Final = 8
 """Unseen readings that a challenger counts as."""
 
 # --- The lattice of a polygon's posterior --------------------------------------------------------------------------
 
 LATTICE_PITCH: Final = 1.3
-"""The lattice's pitch, in expected standard deviations, …"""
+"""The lattice's pitch, in expected standard deviations."""
 LATTICE_RADIUS2: Final = 6
-"""… and its squared radius, in pitches: 81 points."""
+"""The lattice's squared radius, in pitches: 81 points."""
 LATTICE_ATTEMPTS: Final = 5
 """Greatest number of lattices laid for a track: the bound on the work."""
 LATTICE_LEAD_MAX_NAT: Final = 40.0
 """Greatest lead of a point over the middle that counts."""
 LATTICE_OFF_CENTRE: Final = 0.7
-"""The lattice is laid again when the mean is this many pitches off its middle, …"""
+"""The lattice is laid again when the mean is this many pitches off its middle."""
 LATTICE_NARROW: Final = 0.7
-"""… or a variance, as a share of the expected one, is below this …"""
+"""The lattice is laid again when a variance is below this share of the expected one."""
 LATTICE_WIDE: Final = 1.4
-"""… or above this."""
+"""The lattice is laid again when a variance is above this share of the expected one."""
 LATTICE_THINNEST: Final = 0.1
 """Least variance that the next lattice assumes, in the same shares: a narrower peak falls between the points."""
 LATTICE_CORRELATION_SHARE: Final = 0.95
 """Share of a correlation that the next lattice assumes, so that it never collapses."""
 LATTICE_PITCHES_M: Final = (1e-4, 0.15)
-"""Least and greatest pitch of the place …"""
+"""Least and greatest pitch of the place."""
 LATTICE_PITCHES_RAD: Final = (1e-4, 0.4)
-"""… and of the turn."""
+"""Least and greatest pitch of the turn."""
 FIRST_SIGMA_M: Final = 0.01
-"""Standard deviation of the place assumed for a track's first lattice …"""
+"""Standard deviation of the place that a track's first lattice assumes."""
 FIRST_SIGMA_RAD: Final = 0.02
-"""… and of the turn."""
+"""Standard deviation of the turn that a track's first lattice assumes."""
 
 # --- The life of a polygon track -----------------------------------------------------------------------------------
 
 POLYGON_EVIDENCE_MIN_NAT: Final = 5.0
-"""A track ends with less evidence than this, …"""
+"""A track with less evidence than this ends."""
 POLYGON_UNKNOWN_LEAD_NAT: Final = 8.0
-"""… or if an unknown object's leads it by this."""
+"""A track ends if the evidence of an unknown object leads it by this."""
 POLYGON_ESTABLISH_HITS: Final = 10.0
-"""Least hits to establish a track …"""
+"""Least hits to establish a track."""
 POLYGON_ESTABLISH_SURE: Final = 3.0
-"""… and least sure hits: corners alone fit anywhere. …"""
+"""Least sure hits to establish a track: corners alone fit anywhere."""
 MANY_HITS: Final = 20.0
-"""… From so many hits on it may be reported, …"""
+"""A track of so many hits may be reported, and fewer sure ones suffice to establish it."""
 MANY_HITS_SURE: Final = 2.0
-"""… and so many sure ones suffice to establish it."""
+"""Least sure hits to establish a track of `MANY_HITS`."""
 POLYGON_DOUBT_PROBABILITY: Final = 0.3
-"""A track less probable than this is tentative again, …"""
+"""A track less probable than this is tentative again."""
 POLYGON_DOUBT_SHARE: Final = 0.75
-"""… and so is one that explains less than this share of its near readings."""
+"""A track that explains less than this share of its near readings is tentative again."""
 TWIN_RADII: Final = 0.4
 """Two bodies whose centres are nearer than this, in inner radii, are one."""
 OVERLAP_RADII: Final = 1.8
@@ -163,9 +163,9 @@ POLYGON_WALL_ECHOES_MIN: Final = 12.0
 POLYGON_WALL_LENGTH_RADII: Final = 3.0
 """Least length of such a wall, in inner radii."""
 POLYGON_WALL_BEHIND: Final = -1.15
-"""A body whose centre is this many inner radii behind a wall's face, or before it like a circle's, is the wall, …"""
+"""A body is a wall from so many inner radii on before its face; a negative number is behind it."""
 POLYGON_WALL_SHARE: Final = 0.6
-"""… if the wall explains this many readings per hit of the body. (Bodies in a row have a line in common.)"""
+"""A body is a wall only if that explains this many readings per hit of it: bodies in a row have a line in common."""
 POLYGON_WALL_BEYOND_M: Final = 2.0 * FOOT_M
 """Distance beyond the ends of a line at which a body may still be a part of it."""
 
@@ -175,15 +175,15 @@ POLYGON_PROBABILITY: Final = 0.9
 """A polygon is established from this probability on, and reported, or from the user's `report_probability` if that is
 less."""
 POLYGON_NEAR_M: Final = 6.5 * FOOT_M
-"""Greatest distance of the nearest sensor that heard it, …"""
+"""Greatest distance of the nearest sensor that heard a reported body."""
 POLYGON_DISPERSION_MIN: Final = 0.02
-"""… and least dispersion of the axes: a single face seen from afar may belong to any wall."""
+"""Least dispersion of the axes that heard it: a single face seen from afar may belong to any wall."""
 POLYGON_SIGMA_MAX_M: Final = 0.2 * FOOT_M
 """Greatest standard deviation of its position along either axis."""
 POLYGON_NAMED_HITS_SWEPT: Final = 12.0
-"""Hits fewer than `MANY_HITS`, but so many, suffice …"""
+"""Least hits of a reported body that many readings fit, in place of `MANY_HITS`."""
 POLYGON_SWEPT_READINGS: Final = 80
-"""… where so many readings, silences included, bear on it and fit it."""
+"""Least readings, silences included, that bear on such a body and fit it."""
 POLYGON_INFLATION: Final = 1.15
 """Factor on a polygon's reported covariance: the noise does not include the influence of its neighbours."""
 POLYGON_TURN_SIGMA_RAD: Final = math.radians(MAY_ANSWER_DEG)

@@ -68,9 +68,9 @@ class Predictions(Record):
     """What a circle predicts of each reading, field by field, so that the processor computes several at a time."""
 
     rays: int
-    """By how many rays the circle is heard, 0 by its nearest point. Given, like …"""
+    """By how many rays the circle is heard, 0 by its nearest point. Given, not computed."""
     half_angle: float
-    """… half the beam's opening, rad, where there are rays."""
+    """Half the beam's opening, rad; given where there are rays."""
     error: Annotated[Floats, COMPARED_MAX]
     """Range, or half a cross path, less the predicted one, m."""
     slope_x: Annotated[Floats, COMPARED_MAX]
@@ -211,9 +211,9 @@ class Scratch(Record):
     explained_by: Annotated[Ints, SENSORS_MAX]
     """Explanation of each fired reading; see `UNEXPLAINED`."""
     near_recent: Annotated[Ints, RECENT_READINGS_MAX]
-    """Places of the recent readings that may bear on a new wall, …"""
+    """Places of the recent readings that may bear on a new wall."""
     near_readings: NearReadings
-    """… and those readings."""
+    """The readings at these places."""
     wall_evidence: Annotated[Floats, WALL_BINS]
     """Evidence that a wall covers each of its bins, nat."""
     wall_covered: Annotated[Ints, WALL_BINS]
@@ -244,7 +244,7 @@ class Scratch(Record):
     attracting: Annotated[Floats, ATTRACTING_MAX, 5]
     """Segments as `perception.relaxation` takes them: ends x, y, x, y (m) and normal (rad)."""
     attracting_rows: Annotated[Ints, ATTRACTING_MAX]
-    """0, 1, 2, …"""
+    """The whole numbers from 0 on."""
     pose: Annotated[Floats, 3]
     """x, y (m), heading (rad), as `perception.relaxation` takes a pose."""
     hypothesis: Pose

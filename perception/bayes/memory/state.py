@@ -174,9 +174,9 @@ class CircleTrack(Track):
     is_named: Flag
     """1 while it is reported as a model."""
     other_rays: Annotated[int, up_to(RAYS_MAX)]
-    """By how many rays it was compared last, …"""
+    """By how many rays it was compared last."""
     rays_leads: Annotated[Floats, RAYS_MAX + 1, FINITE]
-    """… and the lead of each; see `circles.heard_rays.compare_rays`."""
+    """The lead of each number of rays; see `circles.heard_rays.compare_rays`."""
     radius: Annotated[float, RADIUS]
     root_xx: Finite
     """Lower Cholesky root of the covariance from which the next grid starts, m."""
@@ -232,11 +232,11 @@ class Rejection(Record):
     x: Place
     y: Place
     radius: Place
-    """Nothing of the kind starts within this, m, …"""
+    """Nothing of the kind starts within this, m."""
     what: Annotated[int, index_of(POLYGON + POLYGONS_MAX)]
     """Index of a circle, or `POLYGON` plus that of a polygon model."""
     evidence_nat: Finite
-    """… until the evidence exceeds this."""
+    """Evidence from which on it may start again."""
 
 
 class State(Record):
@@ -249,9 +249,9 @@ class State(Record):
     segments_held: Count
     """Segments in the outline map: to count them anew would drive everything else out of the processor's caches."""
     buckets_used: Annotated[int, up_to(BUCKETS)]
-    """Buckets of the outline map that hold segments, …"""
+    """How many buckets of the outline map hold segments."""
     used_buckets: Annotated[Ints, BUCKETS, index_of(BUCKETS)]
-    """… and which they are, in ascending order, for the same reason."""
+    """Which buckets these are, in ascending order, for the same reason."""
     refinements: Count
     ring_x: Place
     """Position of the ring at its last firing, m."""
@@ -262,25 +262,25 @@ class State(Record):
     """The same for segments."""
     rejection_count: Count
     heard: Finite
-    """Readings with an echo …"""
+    """Readings with an echo; older ones count less."""
     silent: Finite
-    """… and without; older ones count less."""
+    """Readings without an echo; older ones count less."""
     crosses_kept: Count
     """Cross paths ever remembered."""
     names_withdrawn: Count
-    """Names withdrawn since a named circle was last heard from many sides, …"""
+    """Names withdrawn since a named circle was last heard from many sides."""
     unconfirmed_m: Place
-    """… and the way driven since, m."""
+    """The way driven since then, m."""
     roughness_nat: Annotated[Floats, NOISES, FINITE]
     """Evidence of the readings' roughness for each noise."""
     residuals_nat: Annotated[Floats, NOISES, FINITE]
     """Evidence of all objects' residuals for each noise."""
     rays: Annotated[int, up_to(RAYS_MAX)]
-    """By how many rays bodies are heard here, 0: by their nearest points; see `inference.beam`, …"""
+    """By how many rays bodies are heard here, 0: by their nearest points; see `inference.beam`."""
     tried_rays: Annotated[int, up_to(RAYS_MAX)]
-    """… by how many one that failed was tried last, …"""
+    """By how many rays one that failed was tried last."""
     untried: Count
-    """… and how many since then were not."""
+    """How many that failed were not tried since then."""
     crosses: Annotated[Records[Reading], CROSS_HISTORY]
     """A ring buffer of cross paths."""
     sensors: Annotated[Records[Sensor], SENSORS_MAX]

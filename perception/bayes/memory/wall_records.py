@@ -148,16 +148,16 @@ class RoomCorner(Record):
     echoes: Finite
     """Echoes from the point itself."""
     passes: Finite
-    """Ranges towards it that went on …"""
+    """Ranges towards it that went on."""
     ended: Finite
-    """… and those that did not."""
+    """Ranges towards it that did not go on."""
     far_echoes: Finite
     """The echoes and passes from where an edge between mirrors is not heard."""
     far_passes: Finite
     first: Annotated[int, index_of(MAX_WALLS)]
-    """The walls; where a wall ends alone, that wall …"""
+    """The first wall, or the one that ends alone."""
     second: Annotated[int, index_of(MAX_WALLS)]
-    """… and 1 if it is its high end, 0 for its low end."""
+    """The second wall; where one ends alone, 1 for its high end and 0 for its low end."""
     is_kept: Flag
     """1 if it was sure when the robot stopped, until it moves on."""
 
@@ -209,9 +209,9 @@ class WallMap(Record):
     firings: Count
     stop: Stop
     edge_echoes: Finite
-    """Slanting walls that answered from the beam's edge …"""
+    """Slanting walls that answered from the beam's edge."""
     edge_silences: Finite
-    """… and those that did not."""
+    """Slanting walls that did not."""
     is_loud: Flag
     """1 where so few beams are silent that surfaces must answer at any angle."""
     variance_m2: Finite

@@ -27,9 +27,9 @@ from perception.mapping.archive import Archive
 from perception.records import Structured
 
 BEHIND_M: Final = 2.0
-"""An object this much beyond the sensors' range is behind the robot, …"""
+"""An object this much beyond the sensors' range is behind the robot."""
 AHEAD_M: Final = 1.0
-"""… and one less than this beyond it is near."""
+"""An object less than this beyond the sensors' range is near."""
 LOOK_M: Final = 0.5
 """After this way the robot looks for objects to archive and to take up."""
 HELD_SHARE: Final = 0.8

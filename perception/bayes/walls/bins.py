@@ -21,9 +21,9 @@ BIN_WEIGHT_MAX: Final = 40.0
 EDGE_WEIGHT: Final = 0.5
 """Weight of an echo from the beam's edge: the beam is not known as well as the range."""
 PASSES_KEPT: Final = 0.7
-"""Share of the passes that remain after an echo …"""
+"""Share of a bin's passes that remain after an echo."""
 WEIGHT_KEPT: Final = 0.85
-"""… and of the weight after a pass."""
+"""Share of a bin's weight that remains after a pass."""
 PASSES_MAX: Final = 8.0
 """Passes of a bin beyond which more of them say nothing new."""
 SILENT_PASS: Final = 0.7

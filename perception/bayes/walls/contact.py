@@ -30,9 +30,9 @@ SPAN_MARGIN_M: Final = 0.09
 CIRCLE_MARGIN_M: Final = 0.05
 """Distance of a circle's centre outside the beam at which it may still answer."""
 END_SLACK_M: Final = 0.05
-"""Uncertainty of the place of a wall's end …"""
+"""Uncertainty of the place of a wall's end."""
 CORNER_SLACK_M: Final = 0.03
-"""… and of a corner's."""
+"""Uncertainty of the place of a corner."""
 HIDING_PROBABILITY: Final = 0.9
 """Least probability of a round object without a name that hides what lies behind it, and that explains a wall's
 echoes."""

@@ -14,9 +14,9 @@ from perception.bayes.walls.contact import is_on_span, wall_normal
 from perception.kernel import kernel
 
 CORNER_BEYOND_M: Final = 2.0
-"""Farthest that a corner may lie beyond the ends of its walls …"""
+"""Farthest that a corner may lie beyond the ends of its walls."""
 CORNER_INSIDE_M: Final = 0.4
-"""… and inside them."""
+"""Farthest that a corner may lie inside the ends of its walls."""
 CORNER_SINE_MIN: Final = 0.4
 """Least sine of the angle between the walls."""
 

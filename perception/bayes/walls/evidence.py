@@ -16,15 +16,15 @@ from perception.bayes.walls.contact import wall_normal, wall_point
 from perception.kernel import kernel
 
 BARREL_RADIUS_M: Final = 0.7
-"""Radius of the largest barrel, a round object that a wall must explain better than, …"""
+"""Radius of the largest barrel: a wall must explain its echoes better than such a round object."""
 DRUM_RADIUS_M: Final = 0.3
-"""… and that of a drum."""
+"""Radius of a drum, the other round object that a wall must exceed."""
 RIVAL_STEPS: Final = 4
 """Steps of the fit of a rival."""
 RIVAL_OFF_M: Final = 0.2
-"""Standard deviation of its nearest point across the line, before the echoes …"""
+"""Standard deviation of a rival's nearest point across the line, before the echoes."""
 RIVAL_ALONG_M: Final = 0.5
-"""… and along it, from the line's middle."""
+"""Standard deviation of a rival's nearest point along the line, from its middle."""
 STRAY_CHI2: Final = 16.0
 """χ² of an echo that neither explains: the greatest that one counts."""
 EXACT_BELOW_CHI2: Final = 200.0

@@ -27,35 +27,35 @@ ROUGH_WEIGHT_MIN: Final = 0.6
 """Where everything echoes, a bin counts if it holds more than one echo from a beam's edge: echoes of posts lie near
 the line too."""
 LONE_GAP_M: Final = 0.35
-"""Beyond a gap as wide as this …"""
+"""A light end beyond a gap as wide as this is left out: at so long a lever one outlier would prove any line."""
 LONE_WEIGHT_MAX: Final = 1.0
-"""… an end of so little weight is left out: at so long a lever one outlier would prove any line."""
+"""An end of no more weight than this is light."""
 OPENING_MIN_M: Final = 0.3
 """Least width of an opening."""
 OPENING_PASSES_MIN: Final = 1.0
-"""Passes in a gap of that width that make it an opening: echoes from its ends cover the rest …"""
+"""Passes in a gap of `OPENING_MIN_M` that make it an opening: echoes from its ends cover the rest."""
 CRACK_PASSES_MIN: Final = 3.0
-"""… and in a narrower one."""
+"""Passes in a narrower gap that make it an opening."""
 STRAY_BINS: Final = 2
 """Neighbours on either side with which a bin is compared with the line."""
 STRAY_SIGMAS: Final = 3.0
-"""Echoes whose mean lies behind the line by so many standard deviations …"""
+"""Echoes whose mean lies behind the line by so many σ and `STRAY_SLACK_M` come from something else."""
 STRAY_SLACK_M: Final = 0.012
-"""… and this come from something else: from the ends of an opening, mostly."""
+"""Distance in `STRAY_SIGMAS`: such echoes come mostly from the ends of an opening."""
 STRAY_BEFORE_M: Final = 0.03
-"""… and so do those that lie this far before it: from another wall at its corner, before that was known."""
+"""Echoes that lie this far before the line come from another wall at its corner, before that was known."""
 PASSED_MIN: Final = 1.5
-"""Passes there that make it open, …"""
+"""Passes of a bin and its neighbours that make it open."""
 PASSED_SHARE: Final = 0.4
-"""… and their least share of the weight."""
+"""Least share of these passes in the weight there."""
 TRIM_BINS_MAX: Final = 13
 """Fewer bins than this may be left out at an end of a span."""
 TRIM_GAIN_NAT: Final = 0.5
 """Gain required of each earlier end."""
 TRIM_FAR_NAT: Final = 2.0
-"""Loss for each bin that is left out although its echoes are from where an end between mirrors is not heard; …"""
+"""Loss for each bin that is left out although no end between mirrors would be heard from so far."""
 TRIM_REACH_SLACK_M: Final = 0.2
-"""… that is this much farther than such an end was heard."""
+"""An end between mirrors is heard from no farther than this beyond `EDGE_REACH_M`."""
 
 
 @kernel

@@ -46,9 +46,9 @@ from perception.records import Structured
 CANDIDATES_MAX: Final = 8
 """Lines that are scored for one echo."""
 PAIR_MIN_M: Final = 0.25
-"""Least distance between the sensors of a pair, …"""
+"""Least distance between the sensors of a pair."""
 PAIR_MAX_M: Final = 2.5
-"""… and the greatest."""
+"""Greatest distance between the sensors of a pair."""
 PAIR_MIN_COS: Final = 0.75
 """Least cosine between their axes."""
 TANGENT_MAX_COS: Final = 0.9
@@ -56,16 +56,15 @@ TANGENT_MAX_COS: Final = 0.9
 EDGE_NORMAL_MIN_COS: Final = 0.8
 """Least cosine between the axis and the normal of a wall from two beam edges."""
 NEW_WALL_ECHOES_MIN: Final = 6.0
-"""Least score of a candidate (`perception.bayes.walls.support`), and least echoes of a new wall, which has a span
-…"""
+"""Least score of a candidate, as of `perception.bayes.walls.support`, and least echoes of a new wall."""
 NEW_WALL_CHI2_MIN: Final = 9.0
-"""… of this evidence …"""
+"""Least evidence of a new wall's span."""
 NEW_WALL_PASSES_MAX: Final = 0.35
-"""… and of this share of passes at most."""
+"""Greatest passes of a new wall's span, as a share of its weight."""
 NEW_WALL_VARIANCE_M2: Final = 0.03**2
-"""Variance of a candidate's offset before the first fit, m² …"""
+"""Variance of a candidate's offset before the first fit, m²."""
 NEW_WALL_SLOPE_VARIANCE: Final = 0.04**2
-"""… and of its slope."""
+"""Variance of a candidate's slope before the first fit."""
 KNOWN_SIGMA_M: Final = 0.06
 """Readings that touch a candidate where it is known less well than this do not count: what lies there by chance would
 turn it, by a long lever."""

@@ -58,9 +58,9 @@ EXPLAINED_SHARE: Final = 0.6
 MERGED_MISFIT_MAX: Final = 3.0
 """Greatest χ² of a wall for each degree of freedom."""
 EDGE_BINS: Final = 24
-"""A frame moves when readings come so near its first or its last bin …"""
+"""A frame moves when readings come so near its first or its last bin."""
 FRAME_TURN_MAX: Final = 0.02
-"""… and turns when the line is turned by more than this against it, rad."""
+"""A frame turns when the line is turned against it by more than this, rad."""
 HIDDEN_WITHIN_M: Final = 0.1
 """What lies this far inside another wall's ends, and `WENT_ON_M` behind it, is not heard."""
 

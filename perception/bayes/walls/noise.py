@@ -19,9 +19,9 @@ from perception.bayes.walls.contact import line_variance, range_sigma
 from perception.kernel import kernel
 
 PRIOR_ECHOES: Final = 6.0
-"""The estimate of recognition counts as so many echoes …"""
+"""The estimate of recognition counts as so many echoes at each of `PRIOR_RANGES_M`."""
 PRIOR_RANGES_M: Final = (0.5, 1.5, 3.0)
-"""… at each of these ranges."""
+"""Ranges at which the estimate of recognition is taken for known."""
 SURE_SHARE: Final = 0.1
 """Greatest variance of a wall's line, as a share of the range's, at which an error of the range is noise."""
 CHANGE_MIN: Final = 0.1

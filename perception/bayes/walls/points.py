@@ -53,9 +53,9 @@ from perception.bayes.walls.corners import (
 from perception.kernel import Floats, kernel
 
 ECHOES_MIN: Final = 8
-"""Remembered echoes, from afar, that show a corner; an edge is shown by `EDGE_ECHOES_MIN` from near …"""
+"""Remembered echoes, from afar, that show a corner; `EDGE_ECHOES_MIN` from near show an edge."""
 SPREAD_MIN_RAD: Final = 0.2
-"""… if they come from bearings so far apart: those of another wall lie within half a beam of its normal."""
+"""They must come from bearings so far apart: those of another wall lie within half a beam of its normal."""
 LONGER_SIGMAS: Final = 1.3
 """An edge's echo is longer than its wall's own by more than this, which one in ten of those is by chance."""
 LINE_CELL_M: Final = 0.05
@@ -67,9 +67,9 @@ PLACED_TIMES: Final = 3
 BEYOND_MIN_M: Final = 0.15
 """The corner lies at least this far beyond the wall's end; nearer ones are found as the end itself."""
 INSIDE_M: Final = 0.25
-"""What lies farther inside a span is no edge …"""
+"""What lies farther than this inside a span is no edge."""
 ACROSS_M: Final = 1.15
-"""… nor what lies farther beyond its end than across a doorway."""
+"""What lies farther than this beyond a span's end, across a doorway, is no edge of it."""
 SLANT_MIN: Final = 0.35
 """Least share of the range that runs along the wall: the wall's own echoes have none."""
 KNOWN_POINT_M: Final = 0.3

@@ -37,11 +37,11 @@ PRIOR_NAT: Final = -2.0
 SPAN_DENSITY: Final = 4.0
 """Least weight for each metre of a span of a wall that a corner proves."""
 PROOF_ECHOES: Final = 5.0
-"""Echoes of a corner that proves its walls, …"""
+"""Least echoes of a corner that proves its walls."""
 PROOF_LEAD: Final = 3.0
-"""… which are also so many times its passes; …"""
+"""The echoes of a corner that proves its walls are more than so many times its passes."""
 PROOF_SINE: Final = 0.8
-"""… least sine of the angle between them: a line across a corner meets its walls at half of theirs."""
+"""Least sine of the angle between walls that a corner proves: a line across it meets them at half of theirs."""
 THROUGH: Final = 0.8
 """A wall this near to the middle of a named object, as a share of its radius, would go through it."""
 SIDE_M: Final = 0.08

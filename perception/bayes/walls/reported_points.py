@@ -14,9 +14,9 @@ from perception.bayes.walls.straight import Straight
 from perception.records import Structured
 
 CORNER_NEAR_M: Final = 1.0
-"""Distance from the ends of both walls within which a corner need not be heard …"""
+"""A corner this near to the ends of both its walls need not be heard."""
 CORNER_PASSED_SHARE: Final = 0.2
-"""… if no more than this share of the ranges towards it went on."""
+"""No more than this share of the ranges towards a corner that was not heard went on."""
 DOORWAY_MIN_M: Final = 1.05
 """A wall goes on to a corner of which it is the only known side if that is no farther than the narrowest doorway."""
 EDGE_SIGMA_MAX_M: Final = 0.05
@@ -26,16 +26,16 @@ EDGE_LEAD_MIN: Final = 2.0
 EDGE_NEAR_M: Final = 0.18
 """Ranges that passed so near the end of a span, three bins, may have passed beyond the edge."""
 ALONE_EDGE_ECHOES: Final = 5.0
-"""A corner is reported if both walls come as near as `EDGE_SAME_M`, or if `ECHOES_MIN` come from it, whatever is
-known of its walls: from an inside corner between mirrors, from afar. Of an edge between mirrors so many are enough,
-as it is heard from near alone; …"""
+"""Least echoes of an edge between mirrors that is sure whatever is known of its walls. Other points need
+`ECHOES_MIN`; an edge is heard from near alone."""
 ROUGH_LEAD: Final = 5.0
-"""… where slanting walls answer, they must be so many times its passes: some of them may be a wall's."""
+"""Where slanting walls answer, the echoes of such a point are more than so many times its passes: some of them may be
+a wall's."""
 ONE_WAY_SIGMA_M: Final = 0.1
 """An edge that its own echoes place no better than this along some axis was heard from one direction: so the wall
-answers where it goes on. …"""
+answers where it goes on."""
 ONE_WAY_NAT_MAX: Final = 1.0
-"""… Greatest log odds of such an edge. In the rooms of `bench standing` four of seven were true."""
+"""Greatest log odds of such an edge. In the rooms of `bench standing` four of seven were true."""
 EVIDENCE_MAX_NAT: Final = 12.0
 """Greatest evidence that is believed, of which each echo of a point is one: readings are not independent."""
 

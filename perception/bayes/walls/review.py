@@ -57,9 +57,9 @@ It is no more than against an end of a span: those echo in the mouth of a doorwa
 EDGE_SHARE: Final = 0.75
 """This share of it is believed where it comes from a beam's edge."""
 PASS_NAT: Final = 2.5
-"""Evidence of a range that went on against the place, …"""
+"""Evidence of a range that went on against the place."""
 SILENCE_NAT: Final = 2.0
-"""… and of a silence."""
+"""Evidence of a silence against the place."""
 PLACE_NAT: Final = 10.0
 """Greatest evidence of one place: the errors of its readings are not independent."""
 GRAZING_MIN_COS: Final = 0.05

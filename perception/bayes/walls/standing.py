@@ -26,10 +26,10 @@ from perception.sensor_mounts import RingPose
 
 STANDING_RAD: Final = math.acos(STILL_COS)
 STOPPED_M: Final = 0.001
-"""A robot that moved by less than this between two firings …"""
+"""A robot that moved by less than this between two firings, and turned by less than `STOPPED_RAD`, has stopped: bases
+count their way in millimetres. Later it stands while its sensors are where they were, as `placement` has it."""
 STOPPED_RAD: Final = 0.001
-"""… and turned by less than this has stopped: bases count their way in millimetres. Later it stands while its sensors
-are where they were, as `placement` has it."""
+"""Turn in `STOPPED_M`."""
 
 
 def keep_while_standing(memory: Memory, pose: RingPose) -> None:

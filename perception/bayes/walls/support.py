@@ -18,18 +18,18 @@ from perception.kernel import kernel, loop_kernel
 TOUCH_REACH_M: Final = 3.0
 """Readings that touch a candidate farther away than this do not count."""
 SCORE_LEVER: Final = 0.03
-"""Error of a range that supports a candidate, beyond `SAME_SIGMAS`, as its direction is uncertain: so much for each
-metre along it, over the pair's distance, m, …"""
+"""Further error of a range that supports a candidate, beyond `SAME_SIGMAS`, for each metre along it: its direction is
+uncertain by so many metres over the pair's distance."""
 SCORE_LEVER_MAX_M: Final = 1.5
-"""… up to this far along it."""
+"""That error grows no more beyond this distance along the candidate."""
 SCORE_EDGE: Final = 0.6
-"""Weight of an echo from the beam's edge …"""
+"""Weight of an echo from the beam's edge."""
 SCORE_PASS: Final = 0.7
-"""… and of a range that passed through."""
+"""Weight of a range that passed through."""
 PASS_M: Final = 0.3
-"""A range this much longer passed through a candidate …"""
+"""A range this much longer than to a candidate passed through it."""
 PASS_WITHIN_M: Final = 0.5
-"""… where it touches it this near the echo."""
+"""A range that passed through counts where it touches the candidate this near the echo."""
 
 
 @kernel

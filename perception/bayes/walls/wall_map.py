@@ -74,17 +74,17 @@ TIDY_FIRINGS: Final = 8
 REVIEW_FIRINGS: Final = 4
 """Firings between two reviews of a wall: a tenth of a millisecond each."""
 BEAM_WALL_WEIGHT_MIN: Final = 40.0
-"""Walls of this weight show …"""
+"""Walls of this weight show whether slanting walls answer from the beam's edge."""
 EDGE_WITHIN_M: Final = 0.15
-"""… this far inside their ends whether slanting walls answer from the beam's edge."""
+"""They show it only this far inside their ends."""
 THIN_M: Final = 0.2
 """Echoes of round objects thinner than this start no wall and extend none."""
 LOUD_SHARE: Final = 1.2
 """Slanting walls are taken to answer where beams are silent less often than so many times the share that asks for
-care with names, until walls are known that show it; …"""
+care with names, until walls are known that show it. Between drums a fifth of the beams is silent, or more; in rooms
+of walls that answer at any angle a seventh at most."""
 LOUD_SILENCES_MIN: Final = 16.0
-"""… and only where so many silences are expected: wide beams hear mirrors, too. Between drums a fifth of the beams is
-silent, or more; in rooms of walls that answer at any angle a seventh at most."""
+"""So many silences must be expected before that: wide beams hear mirrors, too."""
 EDGES_COUNTED_MAX: Final = 400.0
 """Greatest count of edge echoes and silences; then both are halved."""
 

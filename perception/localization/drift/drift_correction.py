@@ -38,30 +38,30 @@ from perception.sensor_mounts import mounts_array
 LOST_SHARE: Final = 0.25
 """With fewer than this the robot is lost."""
 FIRST_LANDMARK_SIGMA_M: Final = 0.05
-"""Standard deviation of the place relative to the ring, which is perception's from a drifting path, of the first
-landmarks, …"""
+"""Standard deviation of the first landmarks' places relative to the ring, which are perception's from a drifting
+path."""
 NEW_SIGMA_M: Final = 0.04
-"""… of later ones, …"""
+"""Standard deviation of later landmarks' places."""
 MOVED_SIGMA_M: Final = 0.1
-"""… and of one that has moved."""
+"""Standard deviation of the place of a landmark that has moved."""
 FAILURES_MAX: Final = 3
 """A landmark that fails so often in succession, while others answer, has moved."""
 FIRST_LANDMARKS: Final = 3
-"""The filter begins with so many landmarks, …"""
+"""The filter begins with so many landmarks."""
 FIRST_WAY_M: Final = 2.5
-"""… after this way with one, …"""
+"""After this way the filter begins with one landmark."""
 LONGEST_WAY_M: Final = 5.0
-"""… after this one with none."""
+"""After this way the filter begins without a landmark."""
 WAITING_MAX: Final = 240
 """Firings that can wait."""
 NOT_FIRED: Final = -1.0
-"""What a waiting firing holds in place of NaN, for a sensor that did not fire, …"""
+"""What a waiting firing holds in place of NaN, for a sensor that did not fire: recordings hold numbers."""
 SILENT_M: Final = 1e6
-"""… and of infinity, for silence: numbers, as everything that a recording holds."""
+"""What a waiting firing holds in place of infinity, for silence."""
 CYCLE_FIRINGS: Final = 3
-"""Firings from one check for a slip to the next one, …"""
+"""Firings from one check for a slip to the next one."""
 CYCLE_FIRINGS_MAX: Final = 24
-"""… and the most firings of which one looks at the echoes."""
+"""Most firings of which one check looks at the echoes."""
 TURN_PER_M: Final = math.radians(1.0)
 SHIFT_PER_M: Final = 0.02
 """The map frame turns (rad/m) and shifts (m/m) no faster as the robot drives: it does not jump."""

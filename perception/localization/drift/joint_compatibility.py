@@ -19,15 +19,15 @@ from drivers.messages import IDENTITY, Pose, wrap_angle
 from perception.kernel import Floats
 
 PLACE_SIGMA_M: Final = 0.4
-"""Standard deviation of a slip's shift before the echoes …"""
+"""Standard deviation of a slip's shift before the echoes."""
 SLIP_TURN_SIGMA: Final = math.radians(15.0)
-"""… and of its turn, rad."""
+"""Standard deviation of a slip's turn before the echoes, rad."""
 BEARING_SHARE: Final = 0.6
 """Standard deviation of a heard landmark's bearing from the sensor's axis, as a share of half the beam."""
 RANGE_SHARE: Final = 0.015
-"""Standard deviation of a range with the landmark's place: a share of it …"""
+"""Standard deviation of a range with the landmark's place, as a share of it."""
 RANGE_M: Final = 0.02
-"""… and a part that does not depend on it."""
+"""Part of that standard deviation that does not depend on the range."""
 PAIR_GATE: Final = 9.2
 """χ² of two degrees of freedom that a true pair exceeds in one of a hundred cases."""
 JOINT_GATE: Final = (0.0, 9.2, 13.3, 16.8, 20.1, 23.2, 26.2, 29.1, 32.0, 34.8, 37.6, 40.3, 43.0)
@@ -35,15 +35,16 @@ JOINT_GATE: Final = (0.0, 9.2, 13.3, 16.8, 20.1, 23.2, 26.2, 29.1, 32.0, 34.8, 3
 PAIRED_ECHOES_MAX: Final = len(JOINT_GATE) - 1
 """Echoes that are paired at most: `JOINT_GATE` has no more values."""
 PAIRS_MIN: Final = 4
-"""A pairing of fewer echoes than this is none, …"""
+"""A pairing of fewer echoes than this is none."""
 PAIRED_SHARE: Final = 0.6
-"""… nor is one of a smaller share of them."""
+"""A pairing of a smaller share of the echoes is none."""
 BRANCHES_MAX: Final = 80
 """Branches that are followed at most: bounds the work."""
 ALIKE_M: Final = 0.15
-"""Two displacements whose shifts differ by less than this …"""
+"""Two displacements are the same answer if their shifts differ by less than this and their turns by less than
+`ALIKE_RAD`."""
 ALIKE_RAD: Final = math.radians(6.0)
-"""… and whose turns by less than this are the same answer."""
+"""Difference of turns in `ALIKE_M`."""
 
 GAIN_MIN: Final = 5.0
 """A landmark's squared innovations must fall by so much to be clearly better."""

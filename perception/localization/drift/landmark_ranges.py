@@ -33,15 +33,16 @@ SOFT: Final = 6.25
 NEAR_M: Final = 0.5
 """A range this near to a landmark's, but outside the gate, is a failure of that landmark."""
 FRESH_M: Final = 0.02
-"""A sensor's readings from poses nearer than this …"""
+"""A sensor's readings from poses nearer than this, and turned by less than `FRESH_RAD`, repeat one error of rounding;
+only the first is used."""
 FRESH_RAD: Final = math.radians(1.0)
-"""… and turned by less than this repeat one error of rounding; only the first is used."""
+"""Turn in `FRESH_M`."""
 NOISE_MEMORY: Final = 0.005
 """Share of one reading in the estimate of the noise."""
 NOISE_MIN: Final = 0.02
-"""Least estimate of the noise, as a factor on the nominal variance, …"""
+"""Least estimate of the noise, as a factor on the nominal variance."""
 NOISE_MAX: Final = 25.0
-"""… and the greatest."""
+"""Greatest estimate of the noise, as a factor on the nominal variance."""
 FIT_MEMORY: Final = 0.03
 """Share of one expected echo in `Estimate.fit_share`."""
 UNHEARD: Final = -1.0

@@ -19,13 +19,13 @@ LANDMARKS_MAX: Final = 72
 """As many as perception has tracks: 48 circles and 24 polygons."""
 
 STRAY_MIN: Final = 5e-4
-"""Least value of `Estimate.stray` …"""
+"""Least value of `Estimate.stray`."""
 STRAY_MAX: Final = 0.9
-"""… and its greatest."""
+"""Greatest value of `Estimate.stray`."""
 SCALE_MIN: Final = 0.5
-"""Least scale of odometer and ranges, by which something is divided: those of a real robot are near 1, …"""
+"""Least scale of odometer and ranges, by which something is divided: those of a real robot are near 1."""
 SCALE_MAX: Final = 2.0
-"""… and the greatest."""
+"""Greatest scale of odometer and ranges."""
 
 HEADING, X, Y, OFFSET, ODOMETER, TURN, RANGE = range(7)
 """Rows of the covariance for the fields of `Estimate`, in their order; those of the landmarks follow."""

@@ -33,13 +33,13 @@ from perception.sensor_mounts import RingPose, mounts_array, turned_mounts
 
 OFFSET_SIGMA_RAD: Final = math.radians(0.5)
 ODOMETER_SIGMA: Final = 0.03
-"""Standard deviation at the start of the odometer's scale, …"""
+"""Standard deviation of the odometer's scale at the start."""
 TURN_SIGMA: Final = 0.01
-"""… and of those of the turns and of the ranges."""
+"""Standard deviation of the scale of turns, and of that of ranges, at the start."""
 HEADING_RATES: Final = (math.radians(0.1) * 2.0 ** (0.5 * np.arange(12.0))) ** 2
-"""Variances of the heading by odometry, rad²/m, from .1 to 4.5 °/√m, …"""
+"""Variances of the heading by odometry, rad²/m, from .1 to 4.5 °/√m."""
 HEADING_PRIOR: Final = HEADING_RATES**-0.25
-"""… and their weights before a drive, which let the filter begin with about 1 °/√m."""
+"""Weights of these variances before a drive, which let the filter begin with about 1 °/√m."""
 WALK_WINDOW_M: Final = 0.25
 """The way after which the rates are weighed again."""
 DRIFT_PLACE_WALK: Final = 0.0005**2
@@ -48,21 +48,21 @@ finds, and where wheels slip; what is left is below what the echoes show."""
 SLIP_SHARE: Final = 0.4
 """With fewer of the expected echoes than this, the wheels may have slipped: odometry is then trusted less."""
 FAILURES_DOUBTED: Final = 2
-"""So many failures in succession …"""
+"""Failures in succession of a landmark by which it lets the pose be doubted."""
 LANDMARKS_DOUBTED: Final = 2
-"""… of so many landmarks at once let the pose be doubted."""
+"""So many such landmarks at once let the pose be doubted."""
 RENEWED_SHARE: Final = 0.7
 """Share of the expected echoes that is assumed after a displacement was found."""
 FAILING_M: Final = 0.01
 """Standard deviation that each firing adds to the place while a landmark fails so often: a slip, if a small one."""
 SLIP_M: Final = 0.02
-"""Standard deviation that each firing adds to the place then …"""
+"""Standard deviation that each firing adds to the place while the wheels may have slipped."""
 SLIP_RAD: Final = math.radians(1.0)
-"""… and to the heading."""
+"""Standard deviation that each firing adds to the heading then."""
 RANGE_NOISE: Final = 0.01
-"""Nominal noise of a range: a share of it …"""
+"""Nominal noise of a range as a share of it; the filter estimates the true one."""
 RANGE_NOISE_M: Final = 0.001
-"""… and a part that does not depend on it; the filter estimates the true one."""
+"""Part of that noise that does not depend on the range."""
 
 POSE: Final = 4
 """Numbers of a waiting firing before its ranges: the pose of the base, and the ring's direction."""

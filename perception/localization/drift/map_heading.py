@@ -24,15 +24,15 @@ from perception.localization.drift.landmark_state import FIRST, HEADING, ODOMETE
 from perception.localization.drift.landmark_tracker import OFFSET_SIGMA_RAD, POSE, LandmarkTracker
 
 FIRST_FIRINGS: Final = 160
-"""So many are kept, …"""
+"""So many first firings are kept."""
 ENTERED_APART_M: Final = 0.01
-"""… each at least so far from the one before …"""
+"""Each kept firing is at least so far from the one before, or turned by `ENTERED_APART_RAD`."""
 ENTERED_APART_RAD: Final = math.radians(0.5)
-"""… or turned so much."""
+"""Turn in `ENTERED_APART_M`."""
 BEGIN_M: Final = 10.0
-"""The map is known well enough after this way, …"""
+"""The map is known well enough after this way."""
 AGAIN: Final = 3.0
-"""… better after so many times this way, and so on; so is the heading's random walk."""
+"""The map is known better after so many times this way, and so on; so is the heading's random walk."""
 LANDMARKS_MIN: Final = 2
 """Least landmarks that determine a map's turn and shift."""
 ENTERED_AT_ONCE: Final = 8

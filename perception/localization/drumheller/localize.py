@@ -33,9 +33,9 @@ SEGMENTS_MAX: Final = 8
 BLOCKED_MAX: Final = 0.4
 """Largest share of echoes from behind walls: outliers are mostly long, and on mirrors eight echoes may be all."""
 START_CELL_M: Final = 0.1
-"""Of the poses in one cell of this edge …"""
+"""Of the poses in one cell of this edge, and of `START_CELL_RAD` in heading, one is tried."""
 START_CELL_RAD: Final = math.radians(3.0)
-"""… and of this range of headings, one is tried."""
+"""Range of headings in `START_CELL_M`."""
 BATCH: Final = 256
 """Poses that are tried in one call; bounds the memory."""
 POSES_MAX: Final = 4096
@@ -52,9 +52,9 @@ FINE_FIT_STEPS: Final = 4
 REFINED_MAX: Final = 24
 """Poses that are fitted finely."""
 SAME_POSE_M: Final = 0.2
-"""Poses nearer to each other than this …"""
+"""Poses nearer to each other than this, in heading than `SAME_POSE_RAD`, are one."""
 SAME_POSE_RAD: Final = math.radians(7.0)
-"""… whose headings differ by less than this are one."""
+"""Difference of headings in `SAME_POSE_M`."""
 LOST_SIGMAS: Final = 2.0
 """A pose that the search has missed is given a true pose's likelihood, so many standard deviations below its mean."""
 LOST_PROBABILITY: Final = 0.5

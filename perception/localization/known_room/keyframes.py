@@ -16,13 +16,14 @@ from perception.kernel import Floats
 from perception.localization.known_room.particle_update import COLUMNS
 
 KEYFRAME_M: Final = 0.1
-"""A keyframe ends after this way …"""
+"""A keyframe ends after this way."""
 KEYFRAME_RAD: Final = math.radians(6.0)
-"""… or this turn."""
+"""A keyframe ends after this turn."""
 STAND_M: Final = 0.01
-"""A robot stands if it moves less than this …"""
+"""A robot that moves less than this, and turns less than `STAND_RAD`, while the ring fires as often as it has sensors
+stands: that is a keyframe."""
 STAND_RAD: Final = math.radians(1.0)
-"""… and turns less than this while the ring fires as often as it has sensors: that is a keyframe."""
+"""Turn in `STAND_M`."""
 KEYFRAMES_MAX: Final = 128
 """Keyframes that are kept."""
 

@@ -31,29 +31,29 @@ from perception.localization.room.room import Room
 from perception.sensor_mounts import mounts_array
 
 MAP_NOISE_M: Final = 0.03
-"""Noise of a range compared with the map, whose own errors it contains, …"""
+"""Noise of a range compared with the map, whose own errors it contains."""
 DROPOUT: Final = 0.15
-"""… share of the expected echoes that are missed …"""
+"""Share of the expected echoes that are missed."""
 OUTLIERS: Final = 0.1
-"""… and share of the readings that are of something else."""
+"""Share of the readings that are of something else than the map."""
 WINDOW_M: Final = 9.0
 """Way over which odometry compounds keyframes for a search."""
 WINDOW_LEAST: Final = 9
-"""Where so many keyframes are a longer way, …"""
+"""Keyframes of a search at least: their way may be longer than `WINDOW_M`."""
 WINDOW_FAR_M: Final = 16.0
-"""… that is taken, up to this."""
+"""Longest way of these keyframes."""
 WINDOW_MAX: Final = 96
 """Most keyframes of it."""
 SEARCH_M: Final = (1.0, 3.0)
-"""Way until the first search, and the longest one between two searches, …"""
+"""Way until the first search, and the longest one between two searches."""
 SEARCH_GROWTH: Final = 1.5
-"""… and by how much it grows from one to the next."""
+"""Factor by which that way grows from one search to the next."""
 STAND_SEARCH_M: Final = 0.3
 """A robot that stands searches if it has driven so far since the last search."""
 ASSUMED_M: Final = 0.3
-"""Standard deviation of a place that the operator names, on each axis, …"""
+"""Standard deviation of a place that the operator names, on each axis."""
 ASSUMED_RAD: Final = math.radians(12.0)
-"""… and half the width of its row of headings."""
+"""Half the width of the row of headings at such a place."""
 SUSPECT_LOG: Final = 4.5
 """Evidence for a tracked place below which a search looks for a better one, nat: the robot may have been carried."""
 LEAD_LOG: Final = 2.0

@@ -25,11 +25,11 @@ WILD_HEARD: Final = 0.9
 LATE_M: Final = 2.0
 """An echo over a second surface is late by up to this."""
 SHARES: Final = (0.5, 0.1, 0.1, 0.2)
-"""Shares at the start, in the order of `Shares`, …"""
+"""Shares at the start, in the order of `Shares`."""
 SHARES_MIN: Final = (0.03, 0.02, 0.05, 0.02)
-"""… their lower bounds …"""
+"""Lower bounds of the shares."""
 SHARES_MAX: Final = (0.97, 0.5, 0.4, 0.9)
-"""… and upper bounds."""
+"""Upper bounds of the shares."""
 ROOMS: Final = (SHARES, (0.8, 0.25, 0.1, 0.4))
 """What a search tries while nothing was learned: those, and the shares of a real building of smooth surfaces. Between
 mirrors the right place is with the former hardly better than others."""

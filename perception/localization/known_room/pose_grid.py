@@ -40,13 +40,13 @@ BLOCK: Final = 16
 GRID_READINGS_MAX: Final = 108
 """Readings that are compared."""
 SIGMA_M: Final = 0.12
-"""Standard deviation of a range from the table: that of half a cell …"""
+"""Standard deviation of a range from the table: that of half a cell."""
 SIGMA_SHARE: Final = 0.03
-"""… and a share of the range."""
+"""Part of that standard deviation that is a share of the range."""
 GRID_DROPOUT: Final = 0.2
-"""Share of the expected echoes that are not heard …"""
+"""Share of the expected echoes that are not heard."""
 WILD_MIN: Final = 0.2
-"""… and least share of the readings that are anything: the grid is coarse."""
+"""Least share of the readings that are anything: the grid is coarse."""
 OUTSIDE: Final = 0.125
 """Likelihood ratio of a reading that would be taken outside the table."""
 FACTORS: Final = 24

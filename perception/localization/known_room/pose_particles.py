@@ -40,13 +40,13 @@ SHARE_TEMPER: Final = 0.5
 RESAMPLE_SHARE: Final = 0.5
 """Particles are resampled where fewer than this share of them carry the weight."""
 MERGE_M: Final = 0.3
-"""Hypotheses nearer to each other than this …"""
+"""Hypotheses nearer to each other than this, in heading than `MERGE_RAD`, are one."""
 MERGE_RAD: Final = math.radians(10.0)
-"""… whose headings differ by less than this are one."""
+"""Difference of headings in `MERGE_M`."""
 SAME_PLACE_M: Final = 0.5
-"""Hypotheses as near to the best one as this …"""
+"""Hypotheses as near to the best one as this, in heading as `SAME_PLACE_RAD`, are of the same place."""
 SAME_PLACE_RAD: Final = math.radians(15.0)
-"""… whose headings differ by less than this are of the same place."""
+"""Difference of headings in `SAME_PLACE_M`."""
 
 
 class Particle(Record):

@@ -14,9 +14,10 @@ STARTS_MAX: Final = 200
 PROFILES_MAX: Final = 2
 """Guesses of the causes of readings that a search tries."""
 START_APART_M: Final = 0.3
-"""Starts nearer to each other than this, on each axis, …"""
+"""Starts nearer to each other than this on each axis, in heading than `START_APART_RAD`, are one: one and a half
+steps of the search."""
 START_APART_RAD: Final = math.radians(9.0)
-"""… whose headings differ by less than this are one: one and a half steps of the search."""
+"""Difference of headings in `START_APART_M`."""
 
 
 class Start(Record):

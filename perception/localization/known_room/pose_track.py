@@ -37,14 +37,14 @@ QUANTA: Final = math.ceil(HEADINGS / PARTICLES_PER_QUANTUM)
 KEPT_MAX: Final = 40
 """Most hypotheses that are kept."""
 LEAST_LOG: Final = 12.0
-"""Hypotheses less likely than the best by more than this are dropped while they are tracked, nat; …"""
+"""Tracked hypotheses less likely than the best by more than this are dropped, nat."""
 SEARCH_LEAST_LOG: Final = 30.0
-"""… and by more than this while those of a search enter its keyframes, over the first of which a wrong place may fit
-far better than the right one."""
+"""The same while those of a search enter its keyframes, over the first of which a wrong place may fit far better than
+the right one."""
 EVIDENCE_MIN: Final = 20.0
-"""Most evidence against a place that is remembered, nat, …"""
+"""Most evidence against a place that is remembered, nat."""
 PLACE_EVIDENCE_MAX: Final = 7.0
-"""… and for it: what is heard later must not drown in a long way."""
+"""Most evidence for a place that is remembered, nat: what is heard later must not drown in a long way."""
 ALIKE_GAIN: Final = (2.3, 1.4)
 """Gain of evidence per echo, nat, that speaks neither for the right place nor for one in a map of another room that
 is alike: where nothing is a mirror, and from a share of mirrors of `MIRRORS` on. At the right place it is 3.1 to 4.3

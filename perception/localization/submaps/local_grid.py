@@ -33,9 +33,9 @@ PASS_RAYS: Final = 21
 ELSEWHERE: Final = 0.005
 """Weight of an echo's origin outside its arc, among cells that answer with probabilities up to 1."""
 PRIOR_HITS: Final = 0.015
-"""Hits …"""
+"""Hits of a cell that was not looked at: it answers with 3 %."""
 PRIOR_LOOKS: Final = 0.5
-"""… and looks of a cell that was not looked at, the sum of half a reading: it answers with 3 %."""
+"""Readings of a cell that was not looked at, passes and hits together."""
 THICKNESS: Final = 3.0
 """A surface is about three cells thick once it is blurred, which divide each echo among them."""
 CHUNK: Final = 64

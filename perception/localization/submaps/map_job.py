@@ -35,9 +35,9 @@ OVERLAP_M: Final = 6.0
 RUN_MAX: Final = 8
 """Maps that are joined to be compared with."""
 MATCH_M: Final = 0.04
-"""Error of a match's place beside that of its readings, …"""
+"""Error of a match's place beside that of its readings."""
 MATCH_RAD: Final = 0.02
-"""… and of its heading."""
+"""Error of a match's heading beside that of its readings."""
 KNOWN_MIN: Final = 20.0
 """Known readings that a match needs."""
 MISFIT_MAX: Final = 0.5
@@ -45,17 +45,17 @@ MISFIT_MAX: Final = 0.5
 MATCH_GATE: Final = 27.0
 """Squared deviation of a match from what was expected, over its covariance."""
 SEARCH_REACH_M: Final = (0.3, 1.2)
-"""A match is looked for about what is expected: no less and no more than this far, …"""
+"""Least and greatest distance from what is expected at which a match is looked for."""
 SEARCH_REACH_RAD: Final = (0.1, 0.3)
-"""… nor than this turned, …"""
+"""Least and greatest turn from what is expected at which a match is looked for."""
 SEARCH_REACH_SIGMAS: Final = 2.5
-"""… and within these limits up to so many standard deviations."""
+"""Between these limits, a match is looked for up to so many standard deviations."""
 EXPECTED_LEAST: Final = (0.01, 0.01, 0.001)
 """Added to the variance of what is expected, m² and rad²: the search is coarse."""
 GRAPH_STEPS_MAX: Final = 6
-"""Gauss-Newton steps after a map, at most, …"""
+"""Gauss-Newton steps after a map, at most."""
 ITERATIONS: Final = 24
-"""… and iterations of one quantum."""
+"""Iterations of such a step in one quantum."""
 LOST_STEPS: Final = 5
 """Steps in which the way that matches have lost is found, odometry exact."""
 SOLVED: Final = 1e-6

@@ -41,21 +41,21 @@ real drives deviate as they say (the median of their squared errors over their c
 STEP: Final = np.array([0.08, 0.08, 0.03])
 """Differences of place (m) and direction (rad) by which the likelihood's slope and curvature are taken."""
 STEP_MOVE_MAX_M: Final = 0.15
-"""The most by which one step shifts a match …"""
+"""The most by which one step shifts a match."""
 STEP_TURN_MAX_RAD: Final = 0.06
-"""… and turns it."""
+"""The most by which one step turns a match."""
 INFORMATION_MIN: Final = 1.0
 """A direction that readings leave free is known to 1 m, or 1 rad."""
 SEARCH_STEP_M: Final = 0.15
-"""Step of a search in place …"""
+"""Step of a search in place."""
 SEARCH_STEP_RAD: Final = 0.05
-"""… and in heading."""
+"""Step of a search in heading."""
 SEARCHED: Final = 8
 """Poses of a search in one quantum."""
 SEARCH_READINGS: Final = 80
-"""Readings of a search …"""
+"""Readings of a search."""
 FIT_READINGS: Final = 250
-"""… and of the match that follows."""
+"""Readings of the match that follows a search."""
 NEWTON_STEPS: Final = 4
 """Newton steps of that match."""
 _AXES: Final = np.eye(3)

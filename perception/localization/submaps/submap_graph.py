@@ -46,23 +46,23 @@ from perception.records import zeros
 from perception.sensor_mounts import mounts_array, mounts_at
 
 WALK_RAD: Final = 0.02
-"""Random walk of odometry's heading, rad/√m, …"""
+"""Random walk of odometry's heading beside the scales, rad/√m."""
 WALK_M: Final = 0.03
-"""… and of its place, m/√m, beside the scales."""
+"""Random walk of odometry's place beside the scales, m/√m."""
 TURN_WAY: Final = 0.3
 """A turn of 1 rad walks as so much way, m/rad."""
 LEAST_VARIANCE: Final = 1e-5
 """Added to the variances of a displacement by odometry, m² and rad², so that none is zero."""
 USUAL_LOG: Final = -0.7
-"""Log likelihood of a known reading where maps fit, at the start, …"""
+"""Log likelihood of a known reading where maps fit, at the start."""
 USUAL_READINGS: Final = 100.0
-"""… and how many readings that is worth."""
+"""How many readings that is worth."""
 REFUTED: Final = 3.0
-"""Log likelihood by which matches refute odometry, nat, beside …"""
+"""Log likelihood by which matches refute odometry, nat, beyond `REFUTED_A_MAP` for each map."""
 REFUTED_A_MAP: Final = 0.6
-"""… this for each map: what is fitted to noise gains ½ nat for each number that it determines, about one a map.
-Drives with exact poses (4 real ones in 4 roundings, 9 in buildings) gain 0.12 to 0.52 a map, and stay 3 nat below
-after one map, 8 after 80. A drive with drift among mirrors is refuted after 8 maps, not after 20."""
+"""What is fitted to noise gains ½ nat for each number that it determines, about one a map. Drives with exact poses (4
+real ones in 4 roundings, 9 in buildings) gain 0.12 to 0.52 a map, and stay 3 nat below after one map, 8 after 80. A
+drive with drift among mirrors is refuted after 8 maps, not after 20."""
 
 
 class SubmapGraph:

@@ -18,13 +18,13 @@ LOST_WAY: Final = (0.02, 0.01)
 """Share of its way that a match with the map before, and one with another, usually loses. Four real drives, two
 buildings and 14 generated rooms with exact poses: -0.03 to 0.07, mean 0.02; and -0.02 to 0.02, mean 0.01."""
 SUBMAP_M: Final = 3.0
-"""A map ends after this way …"""
+"""A map ends after this way."""
 SUBMAP_RAD: Final = 2.0
-"""… or these turns: scales of 3 % deform it by one cell."""
+"""A map ends after these turns: scales of 3 % deform it by one cell."""
 READING_M: Final = 0.1
-"""Readings of one sensor from poses nearer than this …"""
+"""Readings of one sensor from poses nearer than this, in heading than `READING_RAD`, have the same error."""
 READING_RAD: Final = math.radians(6.0)
-"""… whose headings differ by less than this have the same error."""
+"""Difference of headings in `READING_M`."""
 SUBMAP_READINGS_MAX: Final = 512
 """Of one map, which ends with them."""
 

@@ -58,9 +58,9 @@ from perception.mapping.grid.window import (
 )
 
 DIRECTED_ARC_SIGMAS: Final = 1.5
-"""Half the thickness of an echo's arc in a looking direction …"""
+"""Half the thickness of an echo's arc in a looking direction."""
 UNDIRECTED_ARC_SIGMAS: Final = 2.0
-"""… and in the undirected evidence."""
+"""Half the thickness of an echo's arc in the undirected evidence."""
 PASSED: Final = 1.2 * NAT
 """Evidence of a passage through the middle of a beam; towards the edge it vanishes."""
 SILENT_NAT: Final = 1.8 * NAT
@@ -69,24 +69,24 @@ evidence, in which the passages of all directions count, of a passage, too."""
 DIRECTED_UNIT: Final = 1.0
 """An echo's unit of evidence: log odds by ½ + .49 times its share."""
 MIRRORS_PASSED: Final = 0.6
-"""Among mirrors a passage proves so much less, …"""
+"""Share by which a passage proves less among mirrors: a beam of 24° and a looking direction of 45° are wide beside
+the few degrees in which a mirror answers."""
 MIRRORS_SILENT: Final = 0.8
-"""… silence so much less …"""
+"""Share by which silence proves less among mirrors."""
 MIRRORS_UNIT: Final = 2.0
-"""… and an echo so much more: a beam of 24° and a looking direction of 45° are wide beside the few degrees in which a
-mirror answers."""
+"""What an echo proves more among mirrors, in units."""
 MIDDLE: Final = 0.75
-"""A cell of so much evidence from other directions, in the middle of a beam (see `inside`), should answer, …"""
+"""A cell of so much evidence from other directions should answer in the middle of a beam (see `inside`)."""
 PRIOR_ANSWERED: Final = 4.0
-"""Answers that are assumed at the start …"""
+"""Answers that are assumed at the start."""
 PRIOR_PASSED: Final = 1.0
-"""… and passages."""
+"""Passages that are assumed at the start."""
 ANSWERS_MAX: Final = 1000.0
 """When so many were counted, both are halved."""
 DIFFUSE_SHARE: Final = 0.3
-"""Share of passages from which on the undirected evidence counts less and less, …"""
+"""Share of passages from which on the undirected evidence counts less."""
 MIRROR_SHARE: Final = 0.5
-"""… and up to which."""
+"""Share of passages from which on the undirected evidence does not count."""
 
 
 class Scratch(NamedTuple):

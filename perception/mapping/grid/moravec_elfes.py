@@ -22,9 +22,9 @@ from perception.sensor_mounts import SensorPose
 EMPTY, OCCUPIED = range(2)
 """The two values of a cell."""
 ACCURACY: Final = 0.01
-"""ε: error of a range as a share of it, …"""
+"""ε: error of a range as a share of it."""
 ACCURACY_CELLS: Final = 0.65
-"""… and at least so many cells, or an arc would miss all their centres."""
+"""Least error of a range in cells: with less, an arc would miss all their centres."""
 NEAREST_M: Final = 0.15
 """R_min: what is nearer than this is empty for certain, m."""
 

@@ -25,9 +25,9 @@ OCTANTS: Final = 8
 EIGHTH_TAN: Final = math.tan(0.125 * math.pi)
 """Of half a looking direction."""
 SPREAD_CELLS: Final = 0.5
-"""Least standard deviation of an echo's range, in cells …"""
+"""Least standard deviation of an echo's range, in cells."""
 SPREAD_RELATIVE: Final = 0.01
-"""… and as a share of the range."""
+"""Least standard deviation of an echo's range, as a share of it."""
 CENTRED_CELLS: Final = 4
 """The window follows once the robot is so many cells from its middle."""
 DRIVEN_MAX_M: Final = 1e6

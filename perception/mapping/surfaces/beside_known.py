@@ -41,9 +41,9 @@ UNSURE, AWAY, NEAR, ALONG, ON_BODY = range(-1, 4)
 """How near a place is to what is known: perhaps on an unknown object, which may be as large as the largest body and
 is not known; within `LEFTOVER_M` of what is; along a wall or around a corner; on a body."""
 STRAIGHT_M: Final = 1.0
-"""Length of the straight pieces for whose evidence walls are expected at all, …"""
+"""Length of the straight pieces for whose evidence walls are expected at all."""
 STRAIGHT_NAT: Final = 15.0
-"""… and the most that one piece says for itself: its echoes repeat one another."""
+"""The most that one straight piece says for itself: its echoes repeat one another."""
 EVIDENCE_MAX: Final = 30.0
 """Greatest log odds that are reported, nat."""
 PROBABILITY_MIN: Final = 1e-300

@@ -45,9 +45,9 @@ BLUR: Final = 16.0
 HITS: Final = 3.0 / (BLUR * WHOLE)
 """A surface of three cells' thickness gets whole echoes, which blurring divides among them."""
 LEAST_HITS: Final = 0.03
-"""Hits that every cell has, without having been looked at, …"""
+"""Hits that every cell has without having been looked at: it answers with 6 %."""
 LEAST_READINGS: Final = 0.5
-"""… and readings: such a cell answers with 6 %."""
+"""Readings that every cell has without having been looked at."""
 AXIS_LOSS: Final = 0.5
 """At the beam's edge a pass counts half, less with the square of the angle. An echo is as likely from there as
 from the middle: 42 to 67 % of the drives' echoes are from the outer third, as a slanting surface is nearest there."""

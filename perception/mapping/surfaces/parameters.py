@@ -15,11 +15,11 @@ CELL_M: Final = 0.05
 CELLS: Final = 640
 """Cells along an edge of a local map: 32 m. Even, as passes are counted in cells of twice the size."""
 LEFT_M: Final = 9.7
-"""A robot so far from a local map's centre begins another one once this one was searched, …"""
+"""A robot so far from a local map's centre begins another one once this one was searched."""
 LEFT_MAX_M: Final = 10.4
-"""… and at this distance at the latest; …"""
+"""A robot so far from a local map's centre begins another one in any case."""
 REACH_M: Final = 5.5
-"""… and an echo from farther away is as good as silence: its arc is longer than objects are."""
+"""An echo from farther away is as good as silence: its arc is longer than objects are."""
 DIRECTIONS: Final = 12
 """Looking directions for which a cell counts apart: a mirror answers to one and is silent to the next."""
 SAMPLES: Final = 24
@@ -27,9 +27,9 @@ SAMPLES: Final = 24
 WHOLE: Final = 127
 """Share of a whole echo; shares are whole numbers, so that adding and taking away are exact in any order."""
 SHARES_A_WORD: Final = 8
-"""Shares of an echo that are kept in one number, …"""
+"""Shares of an echo that are kept in one number."""
 SHARE_BITS: Final = 7
-"""… and the bits of each."""
+"""Bits of each share in such a number."""
 WHOLE_PASS: Final = 16
 """A pass along the beam's axis; at the beam's edge it counts half."""
 NEARER_M: Final = 0.1
@@ -45,13 +45,13 @@ REVISITS: Final = 3
 LAST_REVISITS: Final = 3
 """Times that all echoes are shared again before a local map is left."""
 SPACING_M: Final = 0.02
-"""A sensor that has moved by less than this …"""
+"""A sensor that has moved by less than this, and turned by less than `SPACING_RAD`, says the same again."""
 SPACING_RAD: Final = 0.02
-"""… and turned by less than this says the same again."""
+"""Turn in `SPACING_M`."""
 READINGS_MAX: Final = 12288
-"""Readings of a local map, and …"""
+"""Readings of a local map, at most."""
 READINGS_KEPT: Final = 6144
-"""… how many of them the next one begins with, at most."""
+"""Readings with which the next local map begins, at most."""
 
 STRENGTH_MIN: Final = 0.9
 """Echoes by which a cell is occupied: each direction counts one at most, and a tenth of the rest; less where few are
@@ -61,9 +61,9 @@ STRENGTH_SHARE: Final = 0.1
 ANSWER_MIN: Final = 0.05
 """Least probability of an answer of an occupied cell, to the direction to which it answers most."""
 TAIL_SHARE: Final = 0.03
-"""A cell with less than this share of the hits …"""
+"""A cell with less than this share of the hits of one within `TAIL_CELLS` has got them by that one's noise."""
 TAIL_CELLS: Final = 3
-"""… of one so many cells away at most has got them by that one's noise."""
+"""Distance of these cells."""
 OWN_HITS_MIN: Final = 0.05
 """Least echoes of the cell itself, without its neighbours."""
 SURFACE_CELLS_MAX: Final = 12288
@@ -77,9 +77,9 @@ TAKEN_M: Final = 0.06
 GAP_M: Final = 0.15
 """Greatest gap in a piece; 0.2 adds false length, 0.1 loses walls between mirrors."""
 PIECE_MIN_M: Final = 0.25
-"""Length of the shortest line of cells that is a piece, …"""
+"""Length of the shortest line of cells that is a piece."""
 PIECE_KEPT_M: Final = 3.0 * CELL_M
-"""… and of what is left of it between ends that are strong. With the first for both, a cell decides which pieces
+"""Least length of a piece between ends that are strong. With `PIECE_MIN_M` for both, a cell decides which pieces
 stay: drives have .1 to 1.9 % less, at the same false share."""
 COVERED_MIN: Final = 0.6
 """Least share of a piece's length with occupied cells."""
@@ -91,15 +91,16 @@ NODE_STRENGTH: Final = 2.0 * (1.0 + STRENGTH_SHARE)
 """It has two whole echoes from two directions, or as much. Drives: with 2.0 polylines explain 0.2 to 1.3 % more and
 2.5 % of them are false, with 2.5 they explain 1 % less."""
 NODE_M: Final = 0.1
-"""Distance between the points of a polyline, at least, …"""
+"""Least distance between the points of a polyline."""
 LINK_M: Final = 0.2
-"""… and at most: twice as much, as there may be no cell for a point between them."""
+"""Greatest distance between the points of a polyline: twice as much, as there may be no cell for a point between
+them."""
 AGREES_M: Final = 0.1
 """Two surfaces within this are one: the distance within which a surface explains an echo."""
 KNOWN_NAT: Final = 40.0
 """Log odds against a piece as a wall where all that was heard lies along what the method knows, before the piece's
-own evidence; …"""
+own evidence."""
 KNOWN_SHARE: Final = 0.7
-"""… even, where this share of it does: half-way between generated rooms and drives."""
+"""The odds are even where this share of it does: half-way between generated rooms and drives."""
 UNKNOWN_M: Final = 10.0
 """So many metres count as known before anything is heard."""

@@ -29,27 +29,27 @@ from perception.records import Records
 SILENCE: Final = 1e6
 """Range of silence, m."""
 ENTERED: Final = 16
-"""Readings that one quantum enters, in a twentieth of a millisecond as each of those below; …"""
+"""Readings that one quantum enters, in a twentieth of a millisecond, as each of those below."""
 SHARED: Final = 48
-"""… readings that it shares along their arcs; …"""
+"""Readings that one quantum shares along their arcs."""
 STRENGTHS: Final = 64
-"""… strengths of cells that it computes, in parts of rows; …"""
+"""Strengths of cells that one quantum computes, in parts of rows."""
 STEPS: Final = 600
-"""… steps along lines, of whole pieces; …"""
+"""Steps along lines that one quantum makes, of whole pieces."""
 LOCATED: Final = 128
-"""… readings that it locates; …"""
+"""Readings that one quantum locates."""
 JUDGED: Final = 64
-"""… echoes by which it judges whole pieces; …"""
+"""Echoes by which one quantum judges whole pieces."""
 ORDERED: Final = 1024
-"""… cells that it puts in order; …"""
+"""Cells that one quantum puts in order."""
 CLEARED: Final = 2
-"""… rows of blocks that it clears."""
+"""Rows of blocks that one quantum clears."""
 IDLE, CAPTURE, GROW, LOCATE, JUDGE, CHOOSE, CHAIN, CLEAR = range(8)
 """Steps of a search, in their order; the last clears the cells at the start of another map."""
 SEARCH_READINGS_MIN: Final = 64
-"""A search begins after so many new readings, …"""
+"""A search begins after so many new readings."""
 SEARCH_SHARE: Final = 5
-"""… or so large a part of all as one in this."""
+"""A search begins after so large a part of all readings as one in this."""
 
 
 @kernel

@@ -36,9 +36,9 @@ RIM: Final = 2
 BLOCK: Final = 16
 """Cells along the edge of a block: where nothing was heard, none of its cells is looked at."""
 CHAIN_MAX: Final = 64
-"""Points of one polyline, at most, …"""
+"""Points of one polyline, at most."""
 NODES_MAX: Final = 4096
-"""… and of all."""
+"""Points of all polylines, at most."""
 ANGLES: Final = 36
 """Directions that are tried through a seed: 5° apart, and the fit does the rest."""
 DIGITS: Final = 256
@@ -111,13 +111,13 @@ class LocalMap(Record):
     centre_x: Place
     centre_y: Place
     count: Annotated[int, up_to(READINGS_MAX)]
-    """Readings that it has, …"""
+    """Readings that it has."""
     entered: Annotated[int, up_to(READINGS_MAX)]
-    """… and how many of them are in the cells."""
+    """How many of its readings are in the cells."""
     revisited: Annotated[int, up_to(READINGS_MAX)]
-    """The next of them that is shared again, …"""
+    """The next reading that is shared again."""
     owed: Count
-    """… and how many are."""
+    """How many readings are to be shared again."""
     carried: Annotated[int, up_to(READINGS_MAX)]
     """Of its readings, the first ones, so many were shared in the last map and keep what they said there."""
     swept: Annotated[int, up_to(READINGS_MAX)]
@@ -144,9 +144,9 @@ class LocalMap(Record):
     pieces: Annotated[Records[Piece], PIECES_MAX]
     points: Annotated[Records[EchoPoint], READINGS_MAX]
     chained: Annotated[int, up_to(NODES_MAX)]
-    """Numbers in `chains`: …"""
+    """Numbers in `chains`."""
     chains: Annotated[Ints, NODES_MAX, up_to(SURFACE_CELLS_MAX)]
-    """… the cells of each polyline in order, one more than the cell's number, and 0 at its end."""
+    """The cells of each polyline in order, one more than the cell's number, and 0 at its end."""
 
 
 class ArcPlace(Record):
@@ -167,9 +167,9 @@ class CellCounts(Record):
     hits: Annotated[Narrow, DIRECTIONS, CELLS, CELLS]
     """Echoes from each cell by looking direction, in parts of `WHOLE`."""
     all_hits: Annotated[Narrow, CELLS, CELLS]
-    """The same for all directions together, …"""
+    """The same for all directions together."""
     block_hits: Annotated[Narrow, CELLS // BLOCK, CELLS // BLOCK]
-    """… and for blocks of cells."""
+    """The same for all directions and blocks of cells."""
     passes: Annotated[Narrow, DIRECTIONS, CELLS // 2, CELLS // 2]
     """Ranges that went on, in parts of `WHOLE_PASS`."""
     all_passes: Annotated[Narrow, CELLS // 2, CELLS // 2]
@@ -192,9 +192,9 @@ class CellCounts(Record):
     uy: Annotated[Floats, ANGLES]
     scores: Annotated[Floats, ANGLES]
     begins: Annotated[Ints, PIECES_MAX + 2]
-    """Where the echoes of each piece begin in `grouped`: …"""
+    """Where the echoes of each piece begin in `grouped`."""
     grouped: Annotated[Ints, READINGS_MAX]
-    """… numbers of readings, in their order."""
+    """Numbers of readings, in the order of their pieces."""
     sums: Annotated[Floats, 12]
     chain: Annotated[Ints, CHAIN_MAX]
     """The cells of a polyline."""
