@@ -55,6 +55,11 @@ def kernels_of(*values: object) -> Iterator[KernelDispatcher]:
             waiting.extend(vars(value).values())
 
 
+def kernels_named(function: FunctionType) -> Iterator[KernelDispatcher]:
+    """Yield the kernels that a function itself names."""
+    yield from (value for value in _named(function) if isinstance(value, KernelDispatcher))
+
+
 @functools.cache
 def _named(function: FunctionType) -> tuple[object, ...]:
     """Return what a function names of its module, and of modules there."""

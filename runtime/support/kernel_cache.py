@@ -83,8 +83,8 @@ OTHERS_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
 
 def kernels_key() -> str:
     """Return a digest of everything that compiled kernels may depend on: the sources, Python, numba and numpy."""
-    checked = os.environ.get("NUMBA_BOUNDSCHECK", "")  # not part of numba's own key
-    digest = hashlib.sha256(f"{sys.version}{version('numba')}{version('numpy')}{checked}".encode())
+    compiler = [os.environ.get(name, "") for name in ("NUMBA_BOUNDSCHECK", "NUMBA_OPT")]
+    digest = hashlib.sha256(f"{sys.version}{version('numba')}{version('numpy')}{compiler}".encode())
     for package in PACKAGES:
         spec = find_spec(package)
         for place in spec.submodule_search_locations or () if spec else ():

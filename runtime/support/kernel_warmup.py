@@ -88,12 +88,24 @@ def _drive(
 
 
 def _ring(settings: Settings) -> None:
-    """Drive past a wall without recognition, as at the start of a run."""
+    """Drive past a wall without recognition, as at the start of a run; test a turn, and report on a sensor."""
+    import numpy as np
+
     from drivers.messages import Pose
     from perception.pipeline import Perception
+    from perception.records import records, zeros
+    from perception.ring_faults.wiring import LOOK_FIELDS, LOOKS, Wiring, weigh_turn
+    from perception.sensor_faults.memory import RingMemory, SensorMemory
+    from perception.sensor_faults.silence import miss_share
+    from perception.sensor_mounts import mounts_array, turn_mounts
 
     perception = Perception(settings.ring, settings.models, settings.perception, recognises=False)
     _drive(settings, perception, refines=False)
+    mounts = mounts_array(settings.ring.mounts)[:1]
+    turn_mounts(mounts, np.zeros(1, np.bool_), 0.0, mounts)
+    looks = Wiring(np.zeros((1, LOOKS, LOOK_FIELDS)), np.zeros(1, np.int64), np.zeros((1, 1)))
+    weigh_turn(mounts, (0.2, 0.1, 1.0), looks, np.zeros((LOOKS, 3)), np.zeros((1, 2)))
+    miss_share(records(SensorMemory, zeros(SensorMemory, 1))[0], records(RingMemory, zeros(RingMemory, 1))[0])
     perception.steady_obstacles(0.1 * WARM_UP_FIRINGS, 1.0)
     perception.unheard.take_ahead(Pose(0.0, 0.0, 0.0), 1.0, 1.0)
     perception.unheard.points()
@@ -109,12 +121,21 @@ def _grid(settings: Settings, method: str) -> None:
 
 
 def _surfaces(settings: Settings) -> None:
-    """Drive past a wall and map it as a surface, also after the memory was restored."""
+    """Drive past a wall and map it as a surface; leave the map, and go on in the midst of a search."""
+    from perception.mapping.surfaces.piece_fit import group_echoes
+    from perception.mapping.surfaces.pieces import order_cells
+    from perception.mapping.surfaces.quantum import end_search
+    from perception.mapping.surfaces.records import CellCounts, LocalMap
+    from perception.records import records, zeros
+
     perception = _perception(settings.of_log(), BAYES, settings.models)
     _drive(settings, perception)
     perception.surfaces.finish()
     perception.polylines()
     perception.restore(perception.snapshot())
+    room, counts = records(LocalMap, zeros(LocalMap, 1)), records(CellCounts, zeros(CellCounts, 1))
+    for kernel in (end_search, order_cells, group_echoes):
+        kernel(room, counts)
 
 
 def _square() -> ModelConfig:

@@ -33,8 +33,12 @@ def find_echo_lag(settings: Settings) -> None:
 
 
 def correct_drift(settings: Settings) -> None:
-    """Drive past objects that become landmarks and vanish; enter every kind of range, and match maps of the way."""
+    """Drive past landmarks that vanish; enter every kind of range, match maps of the way, and move the ring."""
+    import numpy as np
+
+    from drivers.messages import Pose
     from perception.localization.drift.drift_correction import DriftCorrection, SeenObject
+    from perception.localization.drift.landmark_tracker import LandmarkTracker
     from perception.localization.submaps.submap_graph import SubmapGraph
 
     drift, graph = DriftCorrection(settings.ring), SubmapGraph(settings.ring)
@@ -45,6 +49,7 @@ def correct_drift(settings: Settings) -> None:
         graph.observe(firing)
         while graph.can_refine:
             graph.refine()
+    LandmarkTracker(settings.ring).displace(Pose(0.0, 0.0, 0.0), np.zeros((3, 3)))
 
 
 def find_in_room(settings: Settings) -> None:

@@ -73,10 +73,13 @@ def test_a_changed_byte_of_a_source_changes_the_key(home: Path, monkeypatch: pyt
     assert kernels.kernels_key() not in {first, second}
 
 
-def test_kernels_with_checked_bounds_have_marks_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("NUMBA_BOUNDSCHECK", raising=False)
+@pytest.mark.parametrize("setting", ["NUMBA_BOUNDSCHECK", "NUMBA_OPT"])
+def test_kernels_that_are_compiled_otherwise_have_marks_of_their_own(
+    setting: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(setting, raising=False)
     plain = kernels.kernels_key()
-    monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
+    monkeypatch.setenv(setting, "1")
     assert kernels.kernels_key() != plain
 
 

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import math
 import os
+import pkgutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 
 import pytest
 from numba.core import event
 from rich.console import Console
 
+import behaviors
+import perception
 from behaviors.valley import polar_histogram
 from config.load import load_settings
 from config.settings import Settings
@@ -27,6 +32,7 @@ from perception.localization.known_room import pose_grid, pose_track
 from perception.pipeline import Perception
 from runtime.support import kernel_cache as kernels
 from runtime.support import kernel_warmup
+from tests.inner_kernels import is_inner, kernels_named
 
 ROOT = Path(__file__).parents[3]
 
@@ -102,6 +108,32 @@ def test_a_warm_up_runs_every_kernel_that_its_part_calls(
             monkeypatch.setattr(module, name, note(name, getattr(module, name)))
     kernel_warmup.RUN_ONCE[part](load_settings("hallway"))
     assert done == frozenset().union(*names.values())
+
+
+def functions_of(package: ModuleType) -> Iterator[FunctionType]:
+    """Yield the functions and methods of all modules of a package, without its kernels."""
+    for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        module = importlib.import_module(found.name)
+        own = [value for value in vars(module).values() if getattr(value, "__module__", None) == found.name]
+        within = [vars(value).values() for value in own if isinstance(value, type)]
+        for value in (*own, *chain.from_iterable(within)):
+            function = getattr(value, "fget", None) or getattr(value, "func", None) or value
+            if isinstance(function, FunctionType):
+                yield function
+
+
+@pytest.mark.compiled
+@pytest.mark.usefixtures("warm_kernels")
+def test_every_kernel_that_python_calls_is_run_by_a_warm_up() -> None:
+    """One that is not would be compiled within a cycle; this test finds it when nothing else has run it before."""
+    called = {
+        f"{kernel.__module__}.{kernel.__name__}, of {function.__qualname__}"
+        for package in (perception, behaviors)
+        for function in functions_of(package)
+        for kernel in kernels_named(function)
+        if is_inner(kernel)
+    }
+    assert called == set()
 
 
 @pytest.mark.parametrize("part", [kernels.BAYES, kernels.PAPER])
