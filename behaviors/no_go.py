@@ -123,6 +123,16 @@ def no_go_at(zones: Zones, x: float, y: float, radius_m: float) -> str | None:
     return next((zone.what for zone in near if float(zone.distances_m(here)) < radius_m), None)
 
 
+def speed_limit_m_s(zones: Zones, x: float, y: float, radius_m: float) -> float:
+    """Return the least speed limit of the areas that a body of this radius touches at a place, m/s; inf without one.
+
+    The margin of `MARGIN_M` counts as part of the body.
+    """
+    here, reach_m = np.array((x, y)), radius_m + MARGIN_M
+    near = (zone for zone in zones.speed if zone.is_near(x, y, reach_m))
+    return min((zone.speed_max_m_s for zone in near if float(zone.distances_m(here)) < reach_m), default=math.inf)
+
+
 def limited(
     asked: Twist, last: Twist, moving: Twist, pose: Pose, zones: Zones, body: BodyConfig, delay_s: float
 ) -> tuple[Twist, str | None]:

@@ -107,7 +107,7 @@ def drive(state: DriveState, percept: Percept, settings: Settings, now: Moment) 
         after.goal_drive,
         percept.pose,
         state.requested_run_s,
-        now.run_s,
+        now,
         settings,
         stands=stands,
     )

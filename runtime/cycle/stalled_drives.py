@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from behaviors.memory.commitment import Commitment
 from behaviors.memory.way_progress import ENDED_S, STALLED_S, WayProgress, due_m
@@ -14,6 +15,9 @@ from config.settings import Settings
 from perception.percept import Pose
 from runtime.cycle.drive_requests import DriveRequest, Legs
 from runtime.cycle.goal_drive import GoalDrive
+
+if TYPE_CHECKING:
+    from runtime.cycle.drive_state import Moment
 
 LEG_STALLED: Final = (
     "less than {gain_m:.2g} m farther along the leg for {stalled_s:.0f} s: something is in the way, or the schemas "
@@ -46,7 +50,7 @@ def observe_way(
     goal_drive: GoalDrive | None,
     pose: Pose,
     requested_run_s: float,
-    run_s: float,
+    now: Moment,
     settings: Settings,
     *,
     stands: bool,
@@ -65,15 +69,19 @@ def observe_way(
         The drive to a goal, of a mission's step, too.
     pose : Pose
         The robot's, in odometry's frame.
-    requested_run_s, run_s : float
-        When the request was made, and now, by the run's clock, s.
+    requested_run_s : float
+        When the request was made, by the run's clock, s.
+    now : Moment
+        When this is decided, and which speed limits are in force.
     settings : Settings
         Of the run.
     stands : bool
         Whether the robot stands for a reason, as it should.
     """
     behaviors = settings.behaviors
-    gain_m = due_m(min(settings.body.speed_max_m_s, behaviors.arbiter.base_velocity_m_s))
+    limit_m_s = math.inf if now.zones is None else now.zones.slowest_m_s(pose, settings.body.radius_m)
+    gain_m = due_m(min(settings.body.speed_max_m_s, behaviors.arbiter.base_velocity_m_s, limit_m_s))
+    run_s = now.run_s
     progress, stalled_s, stalled = WayProgress(), 0.0, GOAL_STALLED
     nearest_m = None if goal_drive is None else goal_drive.progress.nearest_m
     match request:

@@ -13,7 +13,7 @@ from typing import Final
 
 from behaviors.missions.mission import Mission
 from behaviors.move_to_goal import Goal
-from behaviors.no_go import Zones, limited, no_go_at, with_no_go, zones_of
+from behaviors.no_go import Zones, limited, no_go_at, speed_limit_m_s, with_no_go, zones_of
 from behaviors.schema_registry import goal_of
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate
 from config.mission_step import Frame
@@ -74,6 +74,16 @@ class ZoneLimits:
         if isinstance(drive_request, Teleoperate):
             return percept, None
         return percept, VOID if self.is_void else UNKNOWN_PLACE
+
+    def slowest_m_s(self, pose: Pose, radius_m: float) -> float:
+        """Return the speed limit where a body of this radius (m) is, m/s; inf where none is in force.
+
+        `pose` is in odometry's frame.
+        """
+        if self.frame is None:
+            return math.inf
+        here = self.frame.inverse().compose(pose)
+        return speed_limit_m_s(self.zones, here.x, here.y, radius_m)
 
     def applied(
         self,

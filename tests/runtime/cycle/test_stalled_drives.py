@@ -7,15 +7,22 @@ from collections.abc import Callable
 
 import pytest
 
-from behaviors.memory.way_progress import GROUND_M
+from behaviors.memory.way_progress import GROUND_M, WayProgress
 from behaviors.missions.mission import Mission
+from behaviors.move_ahead import Leg
 from behaviors.move_to_goal import Goal
+from behaviors.no_go import zones_of
 from config.load import load_settings
+from config.places import PlacesConfig, SpeedAreaConfig
 from drivers.messages import Pose
+from runtime.cycle.drive_requests import Legs
+from runtime.cycle.drive_state import Moment
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.preparation import fresh_state
+from runtime.cycle.stalled_drives import observe_way
 from runtime.cycle.step import STANDSTILL
+from runtime.cycle.velocity_limits import ZoneLimits
 from tests.random_robots import random_furnished_room, random_robot
 from tests.runtime.emulated_run import Run
 
@@ -85,6 +92,21 @@ def test_no_drive_is_stalled_without_a_reason(measured: Callable[[str], None]) -
 @pytest.mark.soak
 def test_no_drive_is_stalled_without_a_reason_in_many_rooms(measured: Callable[[str], None]) -> None:
     measured(assert_explained(range(200, 220), range(3), 120.0))
+
+
+@pytest.mark.parametrize("limited", [False, True])
+def test_a_speed_area_is_no_reason_to_say_that_the_drive_is_stalled(limited: bool) -> None:
+    """At .02 m/s a robot gains .4 m in 20 s: too little where it may drive faster, and all that a limit allows."""
+    settings = load_settings("room")
+    area = SpeedAreaConfig(vertices_m=((-9.0, -9.0), (9.0, -9.0), (9.0, 9.0), (-9.0, 9.0)), speed_max_m_s=0.02)
+    zones = zones_of(PlacesConfig(speed_area=(area,) if limited else ()))
+    leg, progress, reasons = Leg.starting_at(Pose(0.0, 0.0, 0.0)), WayProgress(), set[str | None]()
+    for k in range(1200):
+        now = Moment(0.05 * k, zones=ZoneLimits(zones, Pose(1.0, 1.0, 0.5), is_void=False))
+        pose = Pose(0.02 * now.run_s, 0.0, 0.0)
+        progress, leg, reason = observe_way(Legs(), leg, progress, None, pose, 0.0, now, settings, stands=False)
+        reasons.add(reason)
+    assert (reasons == {None}) == limited
 
 
 def test_legs_before_a_wall_are_given_up_and_say_so() -> None:
