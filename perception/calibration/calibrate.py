@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import Firing
-from perception.calibration.beam_fit import BeamFit, Looks, fit_beams
+from perception.calibration.beam_fit import HALF_ANGLE_STEP_RAD, BeamFit, Looks, fit_beams
 from perception.calibration.drive import Drive, Scales, drive_of
 from perception.calibration.geometry_fit import (
     GATE_SIGMAS,
@@ -58,7 +58,10 @@ PLACE_SHOWN: Final = 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """What a drive shows of a robot; what it does not show has its nominal value, and infinite as its uncertainty.
+    """What a drive shows of a robot.
+
+    What it does not show has its nominal value, and infinite as its uncertainty. What differs from the nominal value
+    by no more than the noise of the drive explains has that value, too, with its own uncertainty.
 
     Attributes
     ----------
@@ -78,6 +81,8 @@ class Calibration:
         Of the ranges.
     walls, drums : int
         Surfaces that were found.
+    has_gain : bool
+        Whether anything has another value than the nominal one.
     """
 
     mounts: Floats
@@ -91,9 +96,10 @@ class Calibration:
     noise: RangeNoise
     walls: int
     drums: int
+    has_gain: bool
 
     @property
-    def has_gain(self) -> bool:
+    def shows_any(self) -> bool:
         """Whether the drive shows anything of the robot."""
         return bool(np.isfinite([*self.place_sigmas_m, *self.scale_sigmas]).any())
 
@@ -219,22 +225,37 @@ def _shown(fit: GeometryFit, beams: BeamFit, turn_sigmas: Floats, nominal: Float
     The places of sensors in the ring follow from its turns: where the turn's scale is not shown, no place is.
     """
     geometry, sigmas = fit.geometry, fit.scale_sigmas
-    is_shown = [sigma <= SCALE_SHOWN * PRIORS.scale for sigma in sigmas]
+    is_shown = np.array(sigmas) <= SCALE_SHOWN * PRIORS.scale
     has_place = (fit.mount_sigmas_m <= PLACE_SHOWN * PRIORS.mount_m) & (fit.readings > 0) & is_shown[1]
     has_angle = has_place & np.isfinite(turn_sigmas)
     mounts = nominal.copy()
-    mounts[has_place, :2] = geometry.mounts[has_place]
-    mounts[has_angle, 2] += beams.turns[has_angle]
+    is_elsewhere = has_place & _is_gain(geometry.mounts - nominal[:, :2], fit.mount_sigmas_m)
+    is_turned = has_angle & _is_gain(beams.turns[:, None], turn_sigmas)
+    mounts[is_elsewhere, :2] = geometry.mounts[is_elsewhere]
+    mounts[is_turned, 2] += beams.turns[is_turned]
+    is_wider = has_angle.any() and abs(beams.half_angle - half_angle) > HALF_ANGLE_STEP_RAD
+    is_scaled = is_shown & _is_gain(np.array(geometry.scales)[:, None] - 1.0, np.array(sigmas))
     return Calibration(
         mounts,
         np.where(has_place, fit.mount_sigmas_m, np.inf),
         np.where(has_angle, turn_sigmas, np.inf),
         fit.readings,
-        beams.half_angle if has_angle.any() else half_angle,
+        beams.half_angle if is_wider else half_angle,
         beams.everything_echoes,
-        Scales(*(value if shown else 1.0 for value, shown in zip(geometry.scales, is_shown, strict=True))),
+        Scales(*(value if taken else 1.0 for value, taken in zip(geometry.scales, is_scaled, strict=True))),
         Scales(*(sigma if shown else math.inf for sigma, shown in zip(sigmas, is_shown, strict=True))),
         fit.noise,
         len(geometry.surfaces.walls),
         len(geometry.surfaces.drums),
+        bool(is_wider or is_elsewhere.any() or is_turned.any() or is_scaled.any()),
     )
+
+
+def _is_gain(change: Floats, sigma: Floats) -> NDArray[np.bool_]:
+    """Return whether changes (shape (n, k)) bring values nearer to the truth than the nominal ones are.
+
+    A fit is off by kσ² in the mean square, and the nominal value by what the change's square exceeds kσ² (Akaike's
+    criterion). `sigma` is that of each component, shape (n,).
+    """
+    found: NDArray[np.bool_] = (change**2).sum(axis=1) > 2.0 * change.shape[1] * sigma**2
+    return found

@@ -95,11 +95,17 @@ def calibrate(
             "a wall and turn more slowly",
             FAILED,
         )
-    if not found.has_gain:
+    if not found.shows_any:
         raise UserError(
             f"{file}: the drive shows neither where the sensors are nor by how much odometry and ranges are wrong; "
             "nothing was written: turn slowly twice on the spot a metre from a bare wall, drive four metres past "
             "something round, turn twice again, and measure the way (--way) and the radius (--drum)",
+            FAILED,
+        )
+    if not found.has_gain and lag == settings.ring.echo_lag_s:
+        raise UserError(
+            f"{file}: the robot is as its file says, as far as this drive shows: nothing differs by more than the "
+            "drive's noise explains, so nothing was written",
             FAILED,
         )
     with writing("--out", out):
