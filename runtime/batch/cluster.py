@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 CONNECT_TIMEOUT_S: Final = 10.0
 WORKERS_TIMEOUT_S: Final = 120.0
 """There must be a worker by then."""
+QUIET_S: Final = 5.0
+"""Without a worker for so long, the user reads what is waited for. Those of this machine need about that to start."""
 AHEAD: Final = 2
 """Runs under way for each thread of a worker: the next is there when one ends."""
 COUNT_PERIOD_S: Final = 5.0
@@ -110,7 +112,7 @@ class DaskPool:
 
 
 @contextlib.contextmanager
-def connected(scheduler: str | None, workers: int, log: Path) -> Iterator[DaskPool]:
+def connected(scheduler: str | None, workers: int, log: Path, tell: Callable[[str], None]) -> Iterator[DaskPool]:
     """Yield the workers of a scheduler, or so many processes on this machine, which end with the block.
 
     Parameters
@@ -121,6 +123,8 @@ def connected(scheduler: str | None, workers: int, log: Path) -> Iterator[DaskPo
         Processes on this machine.
     log : Path
         File for what these processes print.
+    tell : callable
+        Gets a line if the first worker is late.
 
     Raises
     ------
@@ -134,7 +138,12 @@ def connected(scheduler: str | None, workers: int, log: Path) -> Iterator[DaskPo
         stack.enter_context(dask.config.set(dict(SETTINGS)))
         if scheduler is None:
             cluster = LocalCluster(
-                n_workers=0, host=LOCAL_HOST, dashboard_address=None, silence_logs="CRITICAL", processes=True
+                n_workers=0,
+                host=LOCAL_HOST,
+                dashboard_address=f"{LOCAL_HOST}:0",  # otherwise it warns if another scheduler has Dask's usual port
+                scheduler_kwargs={"dashboard": False},
+                silence_logs="CRITICAL",
+                processes=True,
             )
             client = stack.enter_context(Client(stack.enter_context(cluster)))
             command = (*WORKER_COMMAND, cluster.scheduler_address)
@@ -156,21 +165,39 @@ def connected(scheduler: str | None, workers: int, log: Path) -> Iterator[DaskPo
                     WRONG_CALL,
                 ) from None
             where, hint, started = f"--scheduler {scheduler}", f"start some with `dask worker {scheduler}`", ()
-        _await_worker(client, started, f"{where}: there is no worker", hint)
+        await_worker(client, started, f"{where}: there is no worker", hint, tell)
         yield DaskPool(client, as_completed())
 
 
-def _await_worker(client: Client, started: Sequence[subprocess.Popen[bytes]], problem: str, hint: str) -> None:
+def await_worker(
+    client: Client,
+    started: Sequence[subprocess.Popen[bytes]],
+    problem: str,
+    hint: str,
+    tell: Callable[[str], None],
+    clock: Callable[[], float] = time.monotonic,
+) -> None:
     """Wait for a worker, but no longer than the first ones of this machine live.
 
-    `problem` and `hint` are what the error says if none comes, or all of `started` end.
+    Parameters
+    ----------
+    client : Client
+        Of the scheduler.
+    started : sequence of Popen
+        The workers of this machine.
+    problem, hint : str
+        What the error says if none comes, or all of `started` end.
+    tell : callable
+        Gets both in a line after `QUIET_S`.
+    clock : callable
+        Monotonic, s.
 
     Raises
     ------
     UserError
         There is no worker.
     """
-    deadline_s = time.monotonic() + WORKERS_TIMEOUT_S
+    begin_s, is_said = clock(), False
     while True:
         have_died = bool(started) and all(process.poll() is not None for process in started)
         try:
@@ -178,7 +205,11 @@ def _await_worker(client: Client, started: Sequence[subprocess.Popen[bytes]], pr
         except TimeoutError:
             if have_died:
                 raise UserError(f"{problem}: each one ends at its start; {hint}", FAILED) from None
-            if time.monotonic() >= deadline_s:
+            waited_s = clock() - begin_s
+            if waited_s >= WORKERS_TIMEOUT_S:
                 raise UserError(f"{problem} after {WORKERS_TIMEOUT_S:g} s; {hint}", FAILED) from None
+            if waited_s >= QUIET_S and not is_said:
+                is_said = True
+                tell(f"{problem} yet, for which up to {WORKERS_TIMEOUT_S:g} s are waited; {hint}")
         else:
             return

@@ -6,6 +6,7 @@ import contextlib
 import os
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -166,7 +167,8 @@ def make_runs(
     say_start(len(left), scheduler, workers, console)
     if scheduler is None:
         compile_kernels(left, console)
-    with connected(scheduler, workers, folder / LOG) as pool, progress(console, "running", len(left)) as step:
+    pools = connected(scheduler, workers, folder / LOG, partial(console.print, soft_wrap=True))
+    with pools as pool, progress(console, "running", len(left)) as step:
         lines = ProgressLines(console, len(left), time.monotonic)
 
         def on_row(row: Row) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -156,7 +157,8 @@ def run_maker(
 
     rows, prepared = RowFolder(folder), set[str]()
     say_start(total, scheduler, workers, console)
-    with connected(scheduler, workers, folder / LOG) as pool, progress(console, "tuning", total) as step:
+    pools = connected(scheduler, workers, folder / LOG, partial(console.print, soft_wrap=True))
+    with pools as pool, progress(console, "tuning", total) as step:
         lines = ProgressLines(console, total, time.monotonic)
 
         def make(runs: Sequence[Run]) -> dict[str, Row]:

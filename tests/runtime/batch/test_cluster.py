@@ -201,10 +201,30 @@ RUN = Run("k", "scene", "clean", 0, "{}")
 def test_workers_that_cannot_start_are_said_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "WORKER_COMMAND", (sys.executable, "-c", "raise SystemExit('no module')"))
     began_s = time.monotonic()
-    with pytest.raises(UserError, match="each one ends at its start"), cluster.connected(None, 2, tmp_path / "log"):
+    with (
+        pytest.raises(UserError, match="each one ends at its start"),
+        cluster.connected(None, 2, tmp_path / "log", print),
+    ):
         pass
     assert time.monotonic() - began_s < 30.0
     assert "no module" in (tmp_path / "log").read_text()
+
+
+def test_a_scheduler_without_a_worker_is_said_long_before_the_sweep_is_given_up() -> None:
+    """There were two minutes of silence."""
+
+    class NoWorkers:
+        def wait_for_workers(self, _count: int, timeout: float) -> None:
+            clock[0] += timeout
+            raise TimeoutError
+
+    clock, said = [0.0], list[tuple[float, str]]()
+    client: Any = NoWorkers()
+    with pytest.raises(UserError, match="no worker after 120 s; start some"):
+        cluster.await_worker(
+            client, (), "no worker", "start some", lambda text: said.append((clock[0], text)), lambda: clock[0]
+        )
+    assert said == [(cluster.QUIET_S, "no worker yet, for which up to 120 s are waited; start some")]
 
 
 def test_a_pool_keeps_two_runs_a_thread_under_way() -> None:
