@@ -95,19 +95,7 @@ def calibrate(
             "a wall and turn more slowly",
             FAILED,
         )
-    if not found.shows_any:
-        raise UserError(
-            f"{file}: the drive shows neither where the sensors are nor by how much odometry and ranges are wrong; "
-            "nothing was written: turn slowly twice on the spot a metre from a bare wall, drive four metres past "
-            "something round, turn twice again, and measure the way (--way) and the radius (--drum)",
-            FAILED,
-        )
-    if not found.has_gain and lag == settings.ring.echo_lag_s:
-        raise UserError(
-            f"{file}: the robot is as its file says, as far as this drive shows: nothing differs by more than the "
-            "drive's noise explains, so nothing was written",
-            FAILED,
-        )
+    refuse_without_gain(file, found, lag_is_new=lag != settings.ring.echo_lag_s)
     with writing("--out", out):
         Path(out).write_text(robot_text(settings, found, Path(file).name, lag), encoding="utf-8")
     output = plain_console()
@@ -123,6 +111,38 @@ def calibrate(
         output.print("without a measured way, lengths are known less well: measure it and give --way")
     output.print(f"{out}: robot file written; use it with: echolocate run --robot {out} --port DEVICE")
     return DONE
+
+
+def refuse_without_gain(file: str, found: Calibration, *, lag_is_new: bool) -> None:
+    """Refuse to write a robot file that would say no more than the one before.
+
+    Parameters
+    ----------
+    file : str
+        The drive's file.
+    found : Calibration
+        The calibration.
+    lag_is_new : bool
+        Whether the drive shows another lag of the ranges.
+
+    Raises
+    ------
+    UserError
+        The drive shows nothing of the robot, or nothing that its file does not say.
+    """
+    if not found.shows_any:
+        raise UserError(
+            f"{file}: the drive shows neither where the sensors are nor by how much odometry and ranges are wrong; "
+            "nothing was written: turn slowly twice on the spot a metre from a bare wall, drive four metres past "
+            "something round, turn twice again, and measure the way (--way) and the radius (--drum)",
+            FAILED,
+        )
+    if not (found.has_gain or lag_is_new):
+        raise UserError(
+            f"{file}: the robot is as its file says, as far as this drive shows: nothing differs by more than the "
+            "noise of the drive explains; nothing was written, and nothing is to be done",
+            FAILED,
+        )
 
 
 def _echo_lag(firings: Sequence[Firing], ring: RingConfig, options: RingLogOptions) -> tuple[float, str]:
