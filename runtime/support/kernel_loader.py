@@ -73,6 +73,9 @@ COUNT_PERIOD_S: Final = 0.5
 """Time between two looks at how many kernels are compiled."""
 
 PREPARING: Final = "recognition is being prepared"
+FIRST_START: Final = (
+    "the kernels that driving needs are being compiled, once for this version: that takes some seconds"
+)
 
 
 class KernelLoader:
@@ -147,6 +150,8 @@ class KernelPreparation:
     ----------
     progress : str
         How many kernels are compiled, and how long the rest will take, or how far loading is.
+    first_start : str or None
+        What the user should know before a first start, in which nothing is shown for seconds; None otherwise.
     is_over : asyncio.Event
         Set by the process once recognition runs with what is loaded, or loading has failed.
     """
@@ -159,6 +164,7 @@ class KernelPreparation:
         self._host_clock = host_clock
         self._begin_host_s = host_clock()
         self.progress = PREPARING
+        self.first_start = FIRST_START if uncompiled_parts(self._folder, [RING]) else None
         self._process: asyncio.subprocess.Process | None = None
         self._output: asyncio.Task[tuple[bytes, bytes]] | None = None
         """Reads what the process writes: behind a full pipe it would wait for ever."""

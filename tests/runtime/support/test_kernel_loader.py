@@ -209,8 +209,13 @@ async def test_what_the_first_cycle_needs_is_compiled_in_a_thread_of_this_proces
         kernel_loader, "compile_parts",
         lambda *call: happened.append((*call, threading.current_thread() is threading.main_thread())),
     )  # fmt: skip
-    await KernelPreparation((EMULATOR, RING, BAYES)).ring(ROUND)
-    assert happened == [(ROUND, kernels.use_kernel_cache(), [RING], False)]
+    preparation = KernelPreparation((EMULATOR, RING, BAYES))
+    assert preparation.first_start is not None, "it says that it takes some seconds"
+    await preparation.ring(ROUND)
+    folder = kernels.use_kernel_cache()
+    assert happened == [(ROUND, folder, [RING], False)]
+    (folder / RING).touch()
+    assert KernelPreparation((EMULATOR, RING, BAYES)).first_start is None
 
 
 async def test_a_preparation_without_a_result_says_why(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
