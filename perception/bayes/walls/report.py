@@ -34,14 +34,10 @@ TOGETHER_WEIGHT_MIN: Final = 5.0
 """Weight of two spans, at least, that are evidence together."""
 PRIOR_NAT: Final = -2.0
 """Log prior odds of a line that passed the tests, before its evidence."""
-SPAN_DENSITY: Final = 4.0
-"""Least weight for each metre of a span of a wall that a corner proves."""
 PROOF_ECHOES: Final = 5.0
 """Least echoes of a corner that proves its walls."""
 PROOF_LEAD: Final = 3.0
 """The echoes of a corner that proves its walls are more than so many times its passes."""
-PROOF_SINE: Final = 0.8
-"""Least sine of the angle between walls that a corner proves: a line across it meets them at half of theirs."""
 THROUGH: Final = 0.8
 """A wall this near to the middle of a named object, as a share of its radius, would go through it."""
 SIDE_M: Final = 0.08
@@ -174,9 +170,7 @@ def sure_walls(walls: Structured, corners: Structured) -> dict[int, Straight]:
     fitting = np.flatnonzero((walls["weight"] > 0.0) & (walls["misfit"] < misfit_max)).tolist()
     heard = corners[(corners["is_used"] == 1) & (corners["echoes"] >= PROOF_ECHOES) & (corners["is_edge"] == 0)]
     heard = heard[heard["echoes"] > PROOF_LEAD * heard["passes"]]
-    first, second = walls[heard["first"]], walls[heard["second"]]
-    sine = first["normal_x"] * second["normal_y"] - first["normal_y"] * second["normal_x"]
-    pairs = np.column_stack([heard["first"], heard["second"]])[np.abs(sine) > PROOF_SINE]
+    pairs = np.column_stack([heard["first"], heard["second"]])
     spans = walls["spans"][fitting]
     is_span = np.arange(spans.shape[1]) < walls["span_count"][fitting, None]
     is_long = is_span & (spans["high"] - spans["low"] >= WALL_MIN_M) & (spans["weight"] >= HEAVIEST_SPAN_MIN)
@@ -211,10 +205,10 @@ def sure_spans(spans: Structured, chi2: float, is_proven: bool) -> NDArray[np.bo
     """
     length, weight, straight = spans["high"] - spans["low"], spans["weight"], spans["chi2"]
     least = SURE_SPAN_WEIGHT if is_proven else WALL_WEIGHT_MIN
-    dense = (weight >= np.maximum(least, SPAN_DENSITY * length)) & (straight > SPAN_CHI2_MIN)
-    sure = dense & (length >= SPAN_MIN_M)
+    heavy = (weight >= least) & (straight > SPAN_CHI2_MIN)
+    sure = heavy & (length >= SPAN_MIN_M)
     if sure.any() and not is_proven:
-        together = chi2 if np.count_nonzero(dense & (weight >= TOGETHER_WEIGHT_MIN)) > 1 else -np.inf
+        together = chi2 if np.count_nonzero(heavy & (weight >= TOGETHER_WEIGHT_MIN)) > 1 else -np.inf
         sure &= bool(max(straight[sure].max(), together) >= WALL_CHI2_MIN and length[sure].max() >= WALL_MIN_M)
     return np.asarray(sure)
 
