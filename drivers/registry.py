@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Protocol, TypedDict, cast
 
-from config.plugins import PluginError, load_plugin
+from config.plugins import PluginError, load_plugin, plugged
 from config.robot import CalibrationConfig, DriverConfig
 from drivers.calibrated_driver import CalibratedDriver
 from drivers.capabilities import CAPABILITIES
@@ -74,7 +74,7 @@ FOREIGN_MIN: Final = 2
 
 def known_drivers() -> dict[str, EntryPoint]:
     """Return all installed drivers by name; a shipped driver takes precedence over another of its name."""
-    return {**{entry.name: entry for entry in entry_points(group=GROUP)}, **SHIPPED}
+    return {**plugged(GROUP), **SHIPPED}
 
 
 def driver_names() -> tuple[str, ...]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
 
 from config.files import ConfigError, list_shipped
 from config.load import load_any, load_model, load_robot, load_settings, override_settings
-from config.plugins import DRIVERS, PluginError, plugged_use
+from config.plugins import DRIVERS, PluginError, plugged, plugged_use
 from config.reference import markdown, settings_of
 from config.settings import Settings
 from tests.installed import install
@@ -151,3 +153,27 @@ def test_the_reference_lists_it() -> None:
 def test_what_is_no_schema_is_refused() -> None:
     with pytest.raises(PluginError, match="needs a subclass"):
         plugged_use("none")
+
+
+def test_packages_are_looked_for_again_only_after_an_installation(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks = list[object]()
+
+    def looking() -> object:
+        looks.append(entry_points())
+        return looks[-1]
+
+    monkeypatch.setattr("config.plugins.entry_points", looking)
+    place = tmp_path / "later"
+    place.mkdir()
+    os.utime(place, (1.0, 1.0))  # its clock may stand still for some milliseconds
+    monkeypatch.syspath_prepend(str(place))
+    assert all("late" not in plugged(DRIVERS) for _ in range(3))
+    assert len(looks) == 1
+    info = place / "late-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: late\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[{DRIVERS}]\nlate = late.family\n")
+    assert plugged(DRIVERS)["late"].value == "late.family"
+    assert len(looks) == 2

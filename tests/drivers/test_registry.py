@@ -26,7 +26,7 @@ def robot_with_driver(name: str) -> RobotConfig:
 def install(monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
     """Make an entry point known as if an installed package provided it."""
     entry = EntryPoint(name, value, GROUP)
-    monkeypatch.setattr(registry, "entry_points", lambda *, group: (entry,) if group == GROUP else ())
+    monkeypatch.setattr(registry, "plugged", lambda group: {name: entry} if group == GROUP else {})
 
 
 def test_a_robot_file_without_a_driver_gets_the_denning() -> None:

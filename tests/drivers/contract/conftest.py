@@ -13,7 +13,7 @@ from tests.drivers.contract.families import CHIRP_ENTRY, FAMILIES
 @pytest.fixture(autouse=True)
 def _installed_example(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make the example known as if an installed package provided it."""
-    monkeypatch.setattr(registry, "entry_points", lambda *, group: (CHIRP_ENTRY,) if group == GROUP else ())
+    monkeypatch.setattr(registry, "plugged", lambda group: {CHIRP_ENTRY.name: CHIRP_ENTRY} if group == GROUP else {})
 
 
 @pytest.fixture(params=sorted(FAMILIES))
