@@ -40,6 +40,11 @@ class HandWatch:
         """Wait for another hand: one that is there already does not count until it has gone."""
         self._free = [near == 0 for near in self._near]
 
+    @property
+    def hearing(self) -> frozenset[int]:
+        """The sensors that hear something as near as a hand, in all but one of `READINGS` at least."""
+        return frozenset(i for i, near in enumerate(self._near) if near >= READINGS - 1 and self._free[i])
+
     def take(self, ranges: Sequence[float]) -> int | None:
         """Take the ranges of a firing; return the sensor that now hears a hand, None if none does."""
         for i, (range_m, before_m) in enumerate(zip(ranges, self._before, strict=True)):
@@ -89,10 +94,12 @@ def judge_hands(ring: RingConfig, answered: Sequence[int | None]) -> list[str]:
         f"their wires, or correct the order of SENSORS or of ring.sensors"
         for i, answer in wrong
     ]
-    lines += [
-        f"sensor {i} DOES NOT HEAR a hand {side_of(axes[i])}: check its 5 V and its wires of trigger and echo; an "
-        f"echo of 5 V needs a divider to the board's 3.3 V"
-        for i, answer in enumerate(answered)
-        if answer is None
-    ]
-    return lines
+    return [*lines, *(deaf_text(i, axes[i]) for i, answer in enumerate(answered) if answer is None)]
+
+
+def deaf_text(sensor: int, angle_rad: float) -> str:
+    """Return the finding about a sensor that does not hear a hand in this direction."""
+    return (
+        f"sensor {sensor} DOES NOT HEAR a hand {side_of(angle_rad)}: check its 5 V and its wires of trigger and "
+        f"echo; an echo of 5 V needs a divider to the board's 3.3 V"
+    )

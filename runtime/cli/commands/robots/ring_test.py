@@ -30,7 +30,7 @@ def ring_test(
         How often each sensor fires.
     hand
         Ask for a hand before each sensor in turn: finds sensors whose wires are exchanged, a ring that is mounted
-        turned, and sensors that never hear an echo.
+        turned, sensors that never hear an echo, and a servo that turns the wrong way or not at all.
     move
         Turn the wheels as well, for a second in each direction: put the robot on a block first.
 

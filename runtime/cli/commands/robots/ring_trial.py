@@ -22,6 +22,7 @@ from drivers.messages import Flags, Floats, Odometry, Twist
 from drivers.registry import line_options, make_driver
 from runtime.cli.commands.robots.crosstalk_trial import crosstalk
 from runtime.cli.commands.robots.hand_trial import HandWatch, judge_hands, side_of
+from runtime.cli.commands.robots.servo_trial import hands_before, judge_servo_hands, stuck_servos
 from runtime.cycle.connection import POLL_S, Connection
 
 SLACK_S: Final = 2.0
@@ -110,7 +111,11 @@ def judge_sensor(ranges: list[float], rounds: int, ring: RingConfig, unsteadines
     """
     heard = sorted(value for value in ranges if math.isfinite(value))
     if not ranges:
-        return Finding(is_good=False, text="NO ANSWER: check its supply, and its trigger and echo wires")
+        text = (
+            "NO ANSWER within its window: check its supply, and its trigger and echo wires; hold something flat in "
+        )
+        text += "front of it: if it answers then, it must report no echo where it hears nothing, and not its maximum"
+        return Finding(is_good=False, text=text)
     if len(ranges) < ANSWERS_MIN * rounds:
         return Finding(is_good=False, text=f"answers {len(ranges)} times of {rounds}: check for a loose wire")
     if not heard:
@@ -297,23 +302,24 @@ class RingTest:
         findings = [
             judge_sensor(each, rounds, ring, unsteadiness_of(ranges, number)) for number, each in enumerate(ranges)
         ]
+        stuck = stuck_servos(ring, [statistics.median(each) if each else math.inf for each in ranges])
         for number, (mount, finding) in enumerate(zip(ring.mounts, findings, strict=True)):
             text = disturbed.get(number, finding.text) if finding.is_good else finding.text
             self._write(f"sensor {number:2} at {math.degrees(mount.angle_rad):4.0f} degrees: {text}\n")
-        return all(finding.is_good for finding in findings) and not disturbed
+        for sensor, text in stuck.items():
+            self._write(f"sensor {sensor} on its servo: {text}\n")
+        return all(finding.is_good for finding in findings) and not disturbed and not stuck
 
     async def _test_places(self, ranges: list[list[float]]) -> bool:
         """Ask for a hand before each sensor, and write which of them does not answer in its place."""
         ring = self._config.ring
-        if ring.has_servo:
-            self._write(
-                "--hand: a sensor on a servo looks everywhere; `echolocate stand` lists what a turn of it hears\n"
-            )
-            return True
         watch = HandWatch([statistics.median(each) if each else math.inf for each in ranges])
-        answered: list[int | None] = []
-        for mount in ring.mounts:
-            self._write(f"hold something flat 10 to 30 cm from the robot, {side_of(mount.angle_rad)} …\n")
+        hands = (
+            [hand.angle_rad for hand in hands_before(ring)] if ring.has_servo else [m.angle_rad for m in ring.mounts]
+        )
+        answered, heard = list[int | None](), list[frozenset[int]]()
+        for angle_rad in hands:
+            self._write(f"hold something flat 10 to 30 cm from the robot, {side_of(angle_rad)} …\n")
             sys.stdout.flush()
             watch.ask()
             found, deadline_s = None, self._clock() + HAND_S
@@ -321,7 +327,8 @@ class RingTest:
                 for reported in await self._exchange():
                     found = watch.take(reported.tolist()) if found is None else found
             answered.append(found)
-        wrong = judge_hands(ring, answered)
+            heard.append(frozenset() if found is None else watch.hearing)
+        wrong = judge_servo_hands(ring, heard) if ring.has_servo else judge_hands(ring, answered)
         for line in wrong or ["each sensor answers in its place"]:
             self._write(f"{line}\n")
         return not wrong
