@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 from behaviors.memory.way_progress import NEARER_M
 from config.behaviors import MoveToGoalConfig
@@ -17,6 +17,36 @@ from config.bounded import Coordinate, Seconds
 from perception.percept import Pose
 
 Fault: TypeAlias = Literal["stuck", "unreachable"]
+
+
+class Beside(NamedTuple):
+    """What stands nearest to a goal."""
+
+    away_m: float
+    """Its distance from the goal, m; infinite while nothing sure is known near it."""
+    body_m: float
+    """Radius of the body, m."""
+    needed_m: float
+    """Least distance from the goal at which the body passes it, m."""
+
+    @property
+    def is_on_goal(self) -> bool:
+        """Whether it stands where the body would stand."""
+        return self.away_m < self.body_m
+
+    @property
+    def advice(self) -> str:
+        """What is wrong with the goal, for the end of a reason; empty if nothing is."""
+        if self.away_m >= self.needed_m:
+            return ""
+        more_m = math.ceil(20.0 * (self.needed_m - self.away_m)) / 20.0
+        return (
+            f": what stands there is {self.away_m:.2f} m from the goal, and the robot needs {self.needed_m:.2f} m "
+            f"(set the goal {more_m:.2f} m farther from it)"
+        )
+
+
+NOTHING_BESIDE: Final = Beside(math.inf, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +82,7 @@ def observe_progress(
     config: MoveToGoalConfig,
     *,
     is_blocked: bool = False,
-    is_occupied: bool = False,
+    beside: Beside = NOTHING_BESIDE,
 ) -> Progress:
     """Return the progress after a cycle; a drive that was given up stays so.
 
@@ -72,8 +102,8 @@ def observe_progress(
         How long either fault may last.
     is_blocked : bool
         Whether the map shows no way on from here to the goal.
-    is_occupied : bool
-        Whether something stands where the robot would stand at the goal.
+    beside : Beside
+        What stands at the goal, which the robot is near; from afar it may be no more than the arc of an echo.
     """
     if before.given_up is not None:
         return before
@@ -84,7 +114,7 @@ def observe_progress(
         after = replace(after, nearest_m=distance_m, nearer_run_s=run_s)
     stood_s, stayed_s = run_s - after.moved_run_s, run_s - max(after.nearer_run_s, after.excused_run_s or 0.0)
     fault: Fault = "unreachable"
-    if stood_s >= config.stuck_after_s and not is_occupied:
+    if stood_s >= config.stuck_after_s and not beside.is_on_goal:
         if is_blocked:
             why = f"the goal is unreachable: the map shows no way to it, {distance_m:.1f} m short of it"
         else:
@@ -92,10 +122,10 @@ def observe_progress(
             little = f"less than {config.stuck_m:g} m in {stood_s:.0f} s"
             fault = "stuck"
             why = f"stuck {distance_m:.1f} m short of the goal: {little}{cause}"
-    elif is_occupied and stayed_s >= config.stuck_after_s:
+    elif beside.is_on_goal and stayed_s >= config.stuck_after_s:
         why = f"the goal is unreachable: something stands there, no nearer than {after.nearest_m:.1f} m"
     elif stayed_s >= config.unreachable_after_s:
         why = f"the goal is unreachable: no nearer than {after.nearest_m:.1f} m for {stayed_s:.0f} s"
     else:
         return after
-    return replace(after, given_up=why, fault=fault)
+    return replace(after, given_up=why + beside.advice, fault=fault)

@@ -13,7 +13,7 @@ from behaviors.follow_valley import AT_GOAL_M, Valley, follow_valley
 from behaviors.leave_canyon import leave_canyon
 from behaviors.memory.commitment import Commitment
 from behaviors.memory.detour import NO_DETOUR, Detour
-from behaviors.memory.goal_progress import Progress, observe_progress
+from behaviors.memory.goal_progress import NOTHING_BESIDE, Beside, Progress, observe_progress
 from behaviors.move_to_goal import Goal, move_to_goal
 from behaviors.response import Response
 from behaviors.steady_heading import held
@@ -107,7 +107,7 @@ def drive_to_goal(
             hold_reason,
             settings.behaviors.move_to_goal,
             is_blocked=not now.search.reaches,
-            is_occupied=_is_occupied(percept, goal, distance_m, settings),
+            beside=_beside(percept, goal, distance_m, settings),
         )
         if progress.given_up is not None:
             decision, hold_reason = Drive(STANDSTILL), progress.given_up
@@ -231,15 +231,19 @@ def _arbitrate(
     return arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, expected, limits, commitment)
 
 
-def _is_occupied(percept: Percept, goal: Goal, distance_m: float, settings: Settings) -> bool:
-    """Return whether something sure stands where the robot would stand at the goal, which it is near.
-
-    From afar it may be no more than the arc of an echo.
-    """
+def _beside(percept: Percept, goal: Goal, distance_m: float, settings: Settings) -> Beside:
+    """Return what sure thing stands nearest to the goal, which the robot is near."""
+    body_m = settings.body.radius_m
+    needed_m = body_m + _margin_m(settings)
     if distance_m >= AT_GOAL_M:
-        return False
-    there = cells_near(percept, goal.x, goal.y, settings.body.radius_m, settings.behaviors.follow_valley)
-    return bool((there.certainties == 1.0).any())
+        return NOTHING_BESIDE
+    there = cells_near(percept, goal.x, goal.y, needed_m, settings.behaviors.follow_valley)
+    return Beside(float(there.distances[there.certainties == 1.0].min(initial=math.inf)), body_m, needed_m)
+
+
+def _margin_m(settings: Settings) -> float:
+    """Return what the arbiter keeps to all that is passed, m."""
+    return min(settings.behaviors.arbiter.clearance_m, PASSAGE_M)
 
 
 def _pushes(percept: Percept, room_m: float | None, settings: Settings) -> Response:
@@ -248,7 +252,7 @@ def _pushes(percept: Percept, room_m: float | None, settings: Settings) -> Respo
     Beside one, it pushes the robot out of that room, and without bound out of what the arbiter keeps to all that is
     passed.
     """
-    zone, margin_m = None, min(settings.behaviors.arbiter.clearance_m, PASSAGE_M)
+    zone, margin_m = None, _margin_m(settings)
     if room_m is not None:
         zone = Zone(max(room_m, margin_m + FAINT_M), margin_m)
     return avoid_static_obstacle(percept, settings.body.radius_m, settings.behaviors.avoid_static_obstacle, zone)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from behaviors.memory.goal_progress import Progress, observe_progress
+from behaviors.memory.goal_progress import NOTHING_BESIDE, Beside, Progress, observe_progress
 from config.behaviors import MoveToGoalConfig
 from perception.percept import Pose
 
@@ -12,14 +12,18 @@ CONFIG = MoveToGoalConfig(stuck_after_s=10.0, stuck_m=0.3, unreachable_after_s=6
 
 
 def driven(
-    places: list[tuple[float, float]], *, is_blocked: bool = False, is_occupied: bool = False, held: str | None = None
+    places: list[tuple[float, float]],
+    *,
+    is_blocked: bool = False,
+    beside: Beside = NOTHING_BESIDE,
+    held: str | None = None,
 ) -> str | None:
     """Return why a drive is given up that is at these places, a second each, with the goal at (10, 0)."""
     progress = Progress.starting_at(Pose(*places[0], 0.0), 10.0 - places[0][0], 0.0)
     for second, (x, y) in enumerate(places):
         progress = observe_progress(
             progress, Pose(x, y, 0.0), 10.0 - x, float(second), held, CONFIG, is_blocked=is_blocked,
-            is_occupied=is_occupied,
+            beside=beside,
         )  # fmt: skip
     return progress.given_up
 
@@ -47,9 +51,26 @@ def test_a_robot_that_circles_is_given_up_later() -> None:
 
 
 def test_a_goal_on_which_something_stands_is_given_up_soon() -> None:
-    assert driven([(5.0 * (k % 2), 0.0) for k in range(11)], is_occupied=True) is None
-    why = driven([(5.0 * (k % 2), 0.0) for k in range(12)], is_occupied=True) or ""
-    assert why.startswith("the goal is unreachable: something stands there, no nearer than 5.0 m")
+    beside = Beside(0.12, 0.25, 0.33)
+    assert driven([(5.0 * (k % 2), 0.0) for k in range(11)], beside=beside) is None
+    assert driven([(5.0 * (k % 2), 0.0) for k in range(12)], beside=beside) == (
+        "the goal is unreachable: something stands there, no nearer than 5.0 m: what stands there is 0.12 m from the "
+        "goal, and the robot needs 0.33 m (set the goal 0.25 m farther from it)"
+    )
+
+
+def test_a_goal_too_near_to_a_wall_is_named_whatever_ends_the_drive() -> None:
+    beside = Beside(0.28, 0.25, 0.33)
+    for is_blocked in (False, True):
+        why = driven([(9.5, 0.0)] * 12, is_blocked=is_blocked, beside=beside) or ""
+        assert why.endswith(
+            "is 0.28 m from the goal, and the robot needs 0.33 m (set the goal 0.05 m farther from it)"
+        )
+    why = driven([(9.5 - 0.4 * (k % 2), 0.0) for k in range(62)], beside=beside) or ""
+    assert "no nearer than 0.5 m for 60 s: what stands there is 0.28 m" in why
+    assert "what stands there" not in (
+        driven([(9.5, 0.0)] * 12, beside=Beside(0.4, 0.25, 0.33)) or "what stands there"
+    )
 
 
 def test_what_is_given_up_stays_so() -> None:
