@@ -1,5 +1,8 @@
 """Tracks as archived records: everything but the readings as it is, and of the readings the newest of each bearing.
 
+Of a bearing that is kept there are as many as the check of the outline needs: where everything echoes, a drum of
+which it had fewer lost its name as the robot came back.
+
 A track takes up to 30 kB, nearly all of it readings; an archived record takes less than 1.8 kB. Readings are kept in
 single precision about the object's centre, which is exact to a micrometre. Cross paths are not kept.
 """
@@ -12,6 +15,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.bayes.circles.outline_check import OUTLINE_READINGS_MIN
+from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.state import FREE, TENTATIVE, CircleTrack, PolygonTrack
 from perception.bounds import COUNT, FLAG, PLACE, Fields, up_to
 from perception.kernel import Floats
@@ -19,7 +24,7 @@ from perception.map_moves import MapMoves
 from perception.records import Structured
 
 ARCHIVED_READINGS: Final = 48
-"""Readings of an archived track: one of each bearing, and some more."""
+"""Readings of an archived track: `OUTLINE_READINGS_MIN` of every other bearing, or more of fewer."""
 BINS: Final = "bins"
 """The field of a track that holds its readings, which an archived one keeps in another form."""
 
@@ -131,7 +136,7 @@ def move_rows(rows: Structured, moves: MapMoves) -> None:
 
 
 def newest_readings(bins: Structured) -> Structured:
-    """Return the newest echo of each bearing bin, then the second newest of each, and so on: (≤ 48,) `Reading`.
+    """Return the newest readings of bearings that lie evenly round, then the newest of each one: (≤ 48,) `Reading`.
 
     Parameters
     ----------
@@ -142,8 +147,17 @@ def newest_readings(bins: Structured) -> Structured:
     rank = np.arange(capacity)[:, None]
     ranks, which = np.nonzero(rank < counts)
     found: Structured = bins["readings"][which, (counts[which] - 1 - ranks) % capacity]
-    echoes: Structured = found[(found["listener_x"] == 0.0) & (found["listener_y"] == 0.0)]
-    return echoes[:ARCHIVED_READINGS]
+    is_own = (found["listener_x"] == 0.0) & (found["listener_y"] == 0.0)
+    found, which = found[is_own], which[is_own]
+    order = np.argsort(which, kind="stable")
+    ranks = np.zeros(len(found), np.int64)
+    ranks[order] = np.arange(len(found)) - np.searchsorted(which[order], which[order])
+    is_new = ranks < OUTLINE_READINGS_MIN
+    heard = np.bincount(which[is_new & (found["range_m"] < FAR)], minlength=len(bins))
+    many, most = np.flatnonzero(heard == OUTLINE_READINGS_MIN), ARCHIVED_READINGS // OUTLINE_READINGS_MIN
+    if len(many) > most:
+        many = many[np.arange(most) * len(many) // most]
+    return found[np.lexsort((which, ranks, ~(is_new & np.isin(which, many))))][:ARCHIVED_READINGS]
 
 
 def bearing_bins(places: Floats, count: int) -> NDArray[np.int64]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.messages import Pose
+from perception.bayes.circles.outline_check import OUTLINE_READINGS_MIN
 from perception.bayes.inference import reservoir
 from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY, Reading
 from perception.bayes.memory.state import CircleTrack, Memory, PolygonTrack
@@ -60,7 +61,7 @@ def test_a_track_comes_back_as_it_was_but_for_its_older_readings(readings: int) 
     counts = after["bins"]["count"]
     assert counts.sum() == min(kept.sum(), ARCHIVED_READINGS)
     assert (counts <= kept).all()
-    assert (counts[kept > 0] > 0).all() or kept.sum() > ARCHIVED_READINGS
+    assert (counts == kept).all() or kept.sum() > ARCHIVED_READINGS
     for b, count in enumerate(counts.tolist()):
         newest = [int(before["bins"]["count"][b] - 1 - k) % BIN_CAPACITY for k in range(count)][::-1]
         for field in ("x", "y", "axis_x", "axis_y", "range_m"):
@@ -81,14 +82,28 @@ def test_a_bearing_that_gets_more_than_it_holds_keeps_the_newest() -> None:
     assert bins["readings"]["y"][b] == pytest.approx(newest["y"], abs=1e-4)
 
 
-def test_of_many_readings_each_bearing_keeps_its_newest() -> None:
+def test_of_many_readings_bearings_all_round_keep_as_many_as_the_outline_needs() -> None:
     bins = filled(1, 400).circles["bins"][0]
     kept = newest_readings(bins)
     assert len(kept) == ARCHIVED_READINGS
-    assert ARCHIVED_READINGS >= BEARING_BINS
-    for b in np.flatnonzero(bins["count"]).tolist():
-        newest = bins["readings"][b, (bins["count"][b] - 1) % BIN_CAPACITY]
-        assert newest.tobytes() in {one.tobytes() for one in kept}
+    held = {one.tobytes() for one in kept}
+    full = []
+    for b in np.flatnonzero(bins["count"] >= OUTLINE_READINGS_MIN).tolist():
+        newest = [(bins["count"][b] - 1 - k) % BIN_CAPACITY for k in range(OUTLINE_READINGS_MIN)]
+        if all(bins["readings"][b, k].tobytes() in held for k in newest):
+            full.append(b)
+    assert len(full) == ARCHIVED_READINGS // OUTLINE_READINGS_MIN
+    assert max(np.diff([*full, full[0] + BEARING_BINS])) <= 4, "they lie all round"
+
+
+def test_silences_are_kept_where_they_are_the_newest() -> None:
+    """Otherwise an object that was carried away would come back from the archive."""
+    memory, one = filled(3, 0), zeros(Reading, 1)
+    track = memory.tracks[0]
+    for k in range(8):
+        one[0] = (track.x + 2.0, track.y, -1.0, 0.0, 2.0 if k < 4 else np.inf, 0.0, 0.0)
+        reservoir.keep_reading(track, track.x, track.y, records(Reading, one)[0])
+    assert np.isinf(newest_readings(memory.circles["bins"][0])["range_m"][:4]).all()
 
 
 def test_bearings_are_those_of_the_reservoir() -> None:

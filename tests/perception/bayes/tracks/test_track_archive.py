@@ -8,13 +8,15 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from config.world import DrumConfig, WorldConfig
+from config.world import AcousticsConfig, DrumConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose
 from perception.bayes.bayes_method import BayesPerception
 from perception.bayes.memory.state import FREE
-from perception.bayes.tracks.track_archive import HELD_SHARE, LOOK_M
+from perception.bayes.tracks.model_check import is_careful
+from perception.bayes.tracks.refine import refine
+from perception.bayes.tracks.track_archive import HELD_SHARE, LOOK_M, TrackArchive
 from perception.detected_object import DetectedObject
 from perception.edits import ClearMap, ConfirmObject, MoveObject, PlaceModel, RemoveObject
 from perception.map_moves import MapMoves
@@ -203,3 +205,27 @@ def test_what_was_left_behind_moves_with_its_map_of_the_way(there: tuple[BayesPe
     assert len(drums) > len(moved) > 0
     perception.follow_maps(3, moves._replace(is_first=True))
     assert perception.memory.state["room"]["remembered_count"] == 0
+
+
+def test_a_drum_that_was_left_behind_keeps_its_name_where_everything_echoes() -> None:
+    """Its archived readings bear the check of its outline, without which such a place names no drum."""
+    acoustics, rng = AcousticsConfig(model="cone", noise_relative=0.01), np.random.default_rng(0)
+    world = WorldConfig(drum=(DrumConfig(x_m=0.0, y_m=0.0, radius_m=FT),), acoustics=acoustics)
+    sonar, perception = Sonar(SETTINGS.ring, compile_scene(world), acoustics, rng), small()
+    for k in range(300):  # round it twice, at 1.2 and 1.5 m
+        turn, away_m = math.tau * k / 150, 1.2 if k < 150 else 1.5
+        pose = Pose(away_m * math.cos(turn), away_m * math.sin(turn), turn)
+        ranges = sonar.fire(pose, 0.0, [i for i in range(24) if i % 3 == k % 3])
+        see(perception, iter([Firing(0.05 * k, pose, 0.0, ranges)]))
+    (track,) = np.flatnonzero(perception.memory.circles["is_named"]).tolist()
+    archive = TrackArchive()
+    archive._kinds(perception.memory, perception.settings, 0.9)[0].put_away(track)
+    (number,) = archive.circles.held()["number"].tolist()
+    archive.take_up(perception.memory, perception.settings, 0.9, number)
+    (track,) = np.flatnonzero(perception.memory.circles["number"] == number).tolist()
+    perception.memory.state["silent"], perception.memory.state["heard"] = 0.0, 1000.0
+    circle = perception.memory.tracks[track]
+    for _ in range(8):
+        refine(perception.memory.s, perception.memory.tracks, perception.settings, track)
+    assert is_careful(perception.memory.s, perception.memory.tracks, perception.settings)
+    assert (circle.is_named, circle.outline_lead < -3.0) == (1, True)
