@@ -35,7 +35,7 @@ class Beside(NamedTuple):
         return self.away_m < self.body_m
 
     @property
-    def advice(self) -> str:
+    def goal_fault(self) -> str:
         """What is wrong with the goal, for the end of a reason; empty if nothing is."""
         if self.away_m >= self.needed_m:
             return ""
@@ -128,4 +128,4 @@ def observe_progress(
         why = f"the goal is unreachable: no nearer than {after.nearest_m:.1f} m for {stayed_s:.0f} s"
     else:
         return after
-    return replace(after, given_up=why + beside.advice, fault=fault)
+    return replace(after, given_up=why + beside.goal_fault, fault=fault)

@@ -232,7 +232,7 @@ def _arbitrate(
 
 
 def _beside(percept: Percept, goal: Goal, distance_m: float, settings: Settings) -> Beside:
-    """Return what sure thing stands nearest to the goal, which the robot is near."""
+    """Return what surely stands nearest to the goal, which the robot is near."""
     body_m = settings.body.radius_m
     needed_m = body_m + _margin_m(settings)
     if distance_m >= AT_GOAL_M:

@@ -41,7 +41,7 @@ class HandWatch:
         self._free = [near == 0 for near in self._near]
 
     @property
-    def hearing(self) -> frozenset[int]:
+    def answering(self) -> frozenset[int]:
         """The sensors that hear something as near as a hand, in all but one of `READINGS` at least."""
         return frozenset(i for i, near in enumerate(self._near) if near >= READINGS - 1 and self._free[i])
 

@@ -327,7 +327,7 @@ class RingTest:
                 for reported in await self._exchange():
                     found = watch.take(reported.tolist()) if found is None else found
             answered.append(found)
-            heard.append(frozenset() if found is None else watch.hearing)
+            heard.append(frozenset() if found is None else watch.answering)
         wrong = judge_servo_hands(ring, heard) if ring.has_servo else judge_hands(ring, answered)
         for line in wrong or ["each sensor answers in its place"]:
             self._write(f"{line}\n")
