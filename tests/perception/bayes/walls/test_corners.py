@@ -61,7 +61,7 @@ def test_a_corner_that_is_heard_stays_when_one_of_its_walls_leaves(
     corner.passes, room.edge_silences, room.edge_echoes = passes, 50.0, edge_echoes
     room.walls[1].weight = 0.0
     for edge in room.edges if others is not None else ():
-        edge.x, edge.echoes = edge.x if edge.is_used == 1 else 50.0, others
+        edge.x, edge.echoes = edge.x if edge.is_used == 1 else 50.0, others or 0.0
         edge.is_used = wall_corners.KEPT
     wall_corners.find_corners(memory.s)
     for _ in range(2):
