@@ -48,6 +48,7 @@ from bench.place_commands import (
     real_places,
     sightings,
     slips,
+    way_places,
 )  # fmt: skip
 from bench.recording import measure_recording
 from bench.runners import Method, candidates
@@ -279,6 +280,7 @@ for command in (
     false_walls,
     building_places,
     real_places,
+    way_places,
     real_rooms,
     false_canyons,
     free_cells,

@@ -73,7 +73,7 @@ def compare(seed: int, odometry: OdometryConfig) -> Comparison:
     return Comparison(
         before == after and _walls(plain) == _walls(corrected),
         len(after) - len(apart), len(before) - len(apart), sum(distance > MOVED_M for distance in apart),
-        _unmatched(_walls(plain), _walls(corrected)) + _unmatched(_walls(corrected), _walls(plain)),
+        unmatched(_walls(plain), _walls(corrected)) + unmatched(_walls(corrected), _walls(plain)),
         (len(before) - len(of_truth[0]), len(after) - len(of_truth[1])),
         (len(drive.drums()) - len(of_truth[0]), len(drive.drums()) - len(of_truth[1])),
         (of_truth[0], of_truth[1]),
@@ -136,7 +136,7 @@ def _distances(
     return apart
 
 
-def _unmatched(walls: Sequence[Wall], others: Sequence[Wall]) -> int:
+def unmatched(walls: Sequence[Wall], others: Sequence[Wall]) -> int:
     """Return how many of the walls lie on none of the others."""
     return sum(all(_off_m(wall, other) > MOVED_M for other in others) for wall in walls)
 

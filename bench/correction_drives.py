@@ -93,6 +93,11 @@ class CorrectionDrive:
         return [(at.x, at.y) for at in seen]
 
 
+def room_of(seed: int) -> str:
+    """Return which of the `ROOMS` is that of a seed."""
+    return ROOMS[(seed + seed // len(ROBOTS)) % len(ROOMS)]
+
+
 def correction_drive(seed: int, odometry: OdometryConfig, seconds: float | None = None) -> CorrectionDrive:
     """Return a drive.
 
@@ -107,7 +112,7 @@ def correction_drive(seed: int, odometry: OdometryConfig, seconds: float | None 
     """
     rng = np.random.default_rng(np.random.SeedSequence([seed, 38]))
     settings = load_settings(None, robot=ROBOTS[seed % len(ROBOTS)], models=["drum"])
-    room = ROOMS[(seed + seed // len(ROBOTS)) % len(ROOMS)]
+    room = room_of(seed)
     acoustics = AcousticsConfig(
         model=("cone", "specular")[int(rng.integers(2))],
         noise_relative=float(rng.choice(NOISES)),

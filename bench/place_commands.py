@@ -346,3 +346,35 @@ def building_places(logs: tuple[Path, ...], *, json: str = "building_places.json
     with console.status("bench") as status:
         rows = measure(logs, starts, status.update)
     return report(json, rows, rows_table("real buildings: errors of the place, m, and shares", rows))
+
+
+def way_places(
+    *, json: str = "way_places.json", rooms: int = 0, first: int = 42000, corridor: int = 0, kilometres: float = 0.0
+) -> int:
+    """Measure the place without a map in generated rooms without drums, in a bare corridor, and on a long way.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    rooms
+        Number of rooms, each driven at three levels of odometry's errors.
+    first
+        Seed of the first room, of the corridor's first drive, and of the long way.
+    corridor
+        Number of drives there and back in a corridor of 60 m, by each model of reflection.
+    kilometres
+        Length of a way round blocks of corridors, km; only the graph of maps follows it.
+    """
+    use_kernel_cache()
+    from bench.way_places import measure_corridor, measure_long, measure_rooms
+
+    def rows(_: Settings, tell: Callable[[str], None]) -> dict[str, dict[str, float]]:
+        found = measure_rooms(rooms, first, tell) if rooms > 0 else {}
+        found |= measure_corridor(range(first, first + corridor), tell)
+        return found | (measure_long(kilometres, first, tell) if kilometres > 0.0 else {})
+
+    return try_in_rooms(
+        rows, lambda found: rows_table("the place without a map: m, shares, ms", found), json,
+        parts=(EMULATOR, LOCALIZATION),
+    )  # fmt: skip
