@@ -724,6 +724,7 @@ interface StateMessage {
   segments: SegmentRows;
   archived?: Array<ObjectRow>;
   polylines?: Array<PolylineRow>;
+  known_way?: WayRow;
   dropped: number;
   controller: boolean;
 }
@@ -870,6 +871,13 @@ interface PolylineRow {
   number: number;
   points: Array<[number, number]>;
   probability: number;
+}
+
+/** The way as it is known now by maps of a few metres of it, in the map frame; empty where none corrects it. */
+interface WayRow {
+  path: Array<[number, number]>;
+  maps: Array<[number, number, number, number, number]>;
+  loops: Array<[number, number, number, number]>;
 }
 
 /** The places on the map. */

@@ -74,7 +74,7 @@ type ShownObject = ObjectRow & { hidden_by: number | null };
 /** What is shown: a state, or nothing yet. */
 type Shown = Omit<
   StateMessage,
-  "type" | "mode" | "drive_request" | "refinement" | "objects" | "segments" | "archived" | "polylines"
+  "type" | "mode" | "drive_request" | "refinement" | "objects" | "segments" | "archived" | "polylines" | "known_way"
 > & {
   mode: Mode | "no data";
   drive_request: StateMessage["drive_request"] | null;

@@ -25,10 +25,12 @@ class LocalizedPose(NamedTuple):
 
 
 class KnownWay(NamedTuple):
-    """The maps of the way where they are known to lie now."""
+    """The way as it is known now, by maps of a few metres of it."""
 
-    places: Floats
-    """The middle of each: x, y, and the standard deviation of each of both, m; shape (n, 3)."""
+    path: Floats
+    """Places of the ring along it, x, y, m; shape (m, 2)."""
+    maps: Floats
+    """The middle of each map: x, y (m) and their covariance xx, xy, yy (m²), seen from the first; shape (n, 5)."""
     loops: Floats
     """Maps that were matched although others lie between them on the way: x, y of one and of the other, m; (k, 4)."""
 

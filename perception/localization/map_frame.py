@@ -12,8 +12,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Final, TypeAlias
 
-import numpy as np
-
 from config.model import ModelConfig
 from config.robot import RingConfig
 from drivers.messages import IDENTITY, Firing, Pose
@@ -176,13 +174,8 @@ class MapFrame(OdometryFrame):
         return self.submaps.odometry_from_map().compose(at).compose(then.inverse())
 
     def known_way(self) -> KnownWay | None:
-        """Return the maps of the way as known now, in odometry's frame of now; None where none corrects it."""
-        if not self.submaps.is_applied:
-            return None
-        to, way = self.submaps.odometry_from_map(), self.submaps.known_way()
-        turn = np.array([[math.cos(to.theta), math.sin(to.theta)], [-math.sin(to.theta), math.cos(to.theta)]])
-        places = np.column_stack([way.places[:, :2] @ turn + (to.x, to.y), way.places[:, 2]])
-        return KnownWay(places, (way.loops.reshape(-1, 2) @ turn + (to.x, to.y)).reshape(-1, 4))
+        """Return the way as known now, in the map frame; None where no map of it corrects odometry."""
+        return self.submaps.known_way() if self.submaps.is_applied else None
 
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame, at the last firing."""

@@ -80,7 +80,7 @@ class OdometryFrame:
         return IDENTITY
 
     def known_way(self) -> KnownWay | None:
-        """Return the maps of the way as known now, in odometry's frame of now; None where none corrects it."""
+        """Return the way as known now, in the map frame; None where no map of it corrects odometry."""
         return None
 
     def odometry_from_map(self) -> Pose:

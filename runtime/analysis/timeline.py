@@ -12,7 +12,7 @@ import numpy as np
 
 from config.settings import Settings
 from config.world import WorldConfig
-from drivers.messages import Floats, LinkCounts, Odometry, Pose
+from drivers.messages import IDENTITY, Floats, LinkCounts, Odometry, Pose
 from perception.detected_object import DetectedObject
 from perception.localization.localized_pose import KnownWay
 from perception.mapping.grid.known_cells import KnownCells
@@ -158,16 +158,6 @@ class MapView:
     """Those of the end."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class KnownPath:
-    """A robot's path as known at the end, in odometry's frame of the end."""
-
-    places: Floats
-    """(n, 2): the robot's places x, y, m."""
-    maps: KnownWay
-    """The maps of the way by which it is known."""
-
-
 @dataclass(slots=True, eq=False)
 class Timeline:
     """A run in the frame of the odometry. Times `t_s` are s of the run's clock after the first cycle or firing."""
@@ -186,8 +176,11 @@ class Timeline:
     """Every reading of the run, at its pose by odometry."""
     known_echoes: Echoes | None = None
     """The same at poses as known at the end, in odometry's frame of the end; None where none was corrected."""
-    known_path: KnownPath | None = None
-    """Where the robot was, as known at the end; None where odometry was not corrected by maps of the way."""
+    known_way: KnownWay | None = None
+    """The way as known at the end, in the map frame, which odometry's was at the start; None where no map of it
+    corrected odometry."""
+    odometry_from_map: Pose = IDENTITY
+    """The map frame in odometry's frame of the end."""
     cross_paths: CrossPathRows = field(default_factory=lambda: np.empty(0, CROSS_PATH))
     """Every cross path of the run, in order of time; empty where no sensor listens to others."""
     odometry: list[tuple[float, Odometry]] = field(default_factory=list)

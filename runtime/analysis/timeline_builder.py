@@ -27,7 +27,6 @@ from runtime.analysis.timeline import (
     Cluster,
     CrossPathRows,
     Echoes,
-    KnownPath,
     MapPlace,
     MapView,
     RunSnapshot,
@@ -40,8 +39,6 @@ SNAPSHOTS_MAX: Final = 240
 """Snapshots kept. At this number every second one is dropped and the interval doubles."""
 FIRST_INTERVAL_S: Final = 0.25
 ODOMETRY_INTERVAL_S: Final = 0.1
-PATH_PLACES_MAX: Final = 2000
-"""Places of a path as known at the end, about."""
 DIGITS: Final = 4
 """Decimals of a coordinate (m) by which a segment is recognised as the same."""
 
@@ -155,7 +152,8 @@ class TimelineBuilder:
             timeline.echoes = np.concatenate(self._rows)
             if perception is not None and perception.map_frame.corrects_path:
                 timeline.known_echoes = self._known_echoes(perception.map_frame)
-                timeline.known_path = self._known_path(perception.map_frame)
+                timeline.known_way = perception.map_frame.known_way()
+                timeline.odometry_from_map = perception.odometry_from_map()
         if self._crosses:
             timeline.cross_paths = np.concatenate(self._crosses)
         if self._segments:
@@ -169,15 +167,6 @@ class TimelineBuilder:
             known += [_turned_echoes(to, rows) for rows in self._rows[begin:end]]
             begin = end
         return np.concatenate([*known, *self._rows[begin:]])
-
-    def _known_path(self, frame: OdometryFrame) -> KnownPath | None:
-        """Return the path as known now, of `PATH_PLACES_MAX` places or few more; None where no map corrects it."""
-        maps, step = frame.known_way(), max(1, len(self._moments) // PATH_PLACES_MAX)
-        if maps is None:
-            return None
-        moments = [moment for _, moment in (*self._moments[:-1:step], *self._moments[-1:])]
-        poses = [frame.moved_since(moment).compose(Pose(*moment.odometry.tolist())) for moment in moments]
-        return KnownPath(np.array([(pose.x, pose.y) for pose in poses]), maps)
 
     def _place_in_map(self, perception: Perception) -> None:
         """Keep the readings since the last cycle, and the objects nearby, in the map frame as it is known now."""

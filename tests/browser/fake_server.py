@@ -76,6 +76,7 @@ class FakeServer:
     areas: list[list[float]] = field(default_factory=list)
     canyons: list[dict[str, Any]] = field(default_factory=list)
     polylines: list[dict[str, Any]] = field(default_factory=list)
+    known_way: dict[str, Any] = field(default_factory=lambda: {"path": [], "maps": [], "loops": []})
     cross_paths: list[dict[str, Any]] = field(default_factory=list)
     flags: list[str] = field(default_factory=list)
     data: dict[str, Any] = field(default_factory=dict)
@@ -166,7 +167,7 @@ class FakeServer:
         stopped = {} if self.mode == "DRIVE" else {"twist": [0.0, 0.0]}
         frame = self.hall.frame(self.cycle) | stopped | self.robot() | {
             "type": "state", "flags": self.flags, "areas": self.areas, "canyons": self.canyons, "segments": segments,
-            "cross_paths": self.cross_paths, "polylines": self.polylines,
+            "cross_paths": self.cross_paths, "polylines": self.polylines, "known_way": self.known_way,
             "drive_request": self.drive_request, "dropped": 0,
             "controller": self.controller == client.number, "playback": self.playback,
         }  # fmt: skip

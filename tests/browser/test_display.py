@@ -40,6 +40,11 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
     server.areas = [[1, 2.0, 0.0, 0.5]]
     server.canyons = [{"number": 1, "mouth": [2.0, 1.0, 2.0, -1.0], "axis": 0.0, "depth": 3.0, "probability": 0.95}]
     server.polylines = [{"number": 1, "points": [[1.0, 0.2], [1.5, 0.5], [1.4, 0.9]], "probability": 0.9}]
+    server.known_way = {
+        "path": [[-1.0, 0.0], [0.0, 0.4], [1.0, 0.3]],
+        "maps": [[-1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.4, 0.02, 0.005, 0.01]],
+        "loops": [[-1.0, 0.0, 0.0, 0.4]],
+    }
     server.cross_paths = [{"robot_s": 8.5, "pose": [2.5, 0.0, 0.0, 0.0], "paths": [[6, 7, 0.6], [6, 5, 0.6]]}]
     server.cycle = 150
     opened = await opener.open(server.url, SMALL)
@@ -57,7 +62,7 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
     await fall_silent(server, opened)
     boxes = opened.page.locator("#layers input")
     names = await opened.page.locator("#layers label").all_inner_texts()
-    assert len(names) == 24
+    assert len(names) == 25
     assert [name for name in names if "arc" in name or "beam" in name] == [
         "arcs of recent echoes",
         "beams firing now",

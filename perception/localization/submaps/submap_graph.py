@@ -25,6 +25,7 @@ from perception.localization.submaps.held_maps import HeldMaps
 from perception.localization.submaps.map_job import Maps, Outcome, match_map
 from perception.localization.submaps.pose_graph import OF_OTHER, SCALES, Link, Node
 from perception.localization.submaps.submap_records import (
+    PATH_PLACES,
     READING_M,
     READING_RAD,
     SUBMAP_M,
@@ -53,6 +54,8 @@ TURN_WAY: Final = 0.3
 """A turn of 1 rad walks as so much way, m/rad."""
 LEAST_VARIANCE: Final = 1e-5
 """Added to the variances of a displacement by odometry, m² and rad², so that none is zero."""
+WAY_POSES: Final = 5
+"""Poses of the map that goes on by which the known way is longer, `READING_M` apart."""
 USUAL_LOG: Final = -0.7
 """Log likelihood of a known reading where maps fit, at the start."""
 USUAL_READINGS: Final = 100.0
@@ -79,7 +82,7 @@ class SubmapGraph:
         Whether matches have refuted odometry, so that poses are corrected.
     """
 
-    SCRATCH: Final = ("_grids", "_job")
+    SCRATCH: Final = ("_grids", "_job", "_way")
     BOUNDS: Final = bounds(
         _mounts=CONSTANT,
         _half_angle=CONSTANT,
@@ -116,6 +119,8 @@ class SubmapGraph:
         self._submaps, self._nodes, self._links = Rows(Submap), Rows(Node), Rows(Link)
         self._grids: dict[int, Floats] = {}
         self._job: Iterator[Outcome | None] | None = None
+        self._way: tuple[tuple[int, ...], KnownWay] | None = None
+        """The known way as it was asked for last, and what it depends on."""
         self._readings[:] = self._trail[:] = 0.0
         self.held.reset()
         self._latest = np.full((len(self._mounts), 3), math.inf)
@@ -174,6 +179,8 @@ class SubmapGraph:
         placed = scaled(between(middle, rows[:, :3]), self._scales)
         placed[:, 2] += rows[:, 3]
         row["readings"][0, : self._count] = np.column_stack([placed, rows[:, 4]])
+        kept = np.linspace(0, self._trail_count - 1, PATH_PLACES).astype(np.int64)
+        row["path"][0] = between(middle, self._trail[kept, :3])
         before = self._submaps.archived_rows
         self._submaps.append(row)
         if len(before) == 0:
@@ -264,7 +271,7 @@ class SubmapGraph:
 
     def drop_caches(self) -> None:
         """Forget what follows from the rest, after a snapshot was put back."""
-        self._grids, self._job = {}, None
+        self._grids, self._job, self._way = {}, None, None
 
     def moment(self) -> Moment:
         """Return the moment of the last firing, for `placed`."""
@@ -272,22 +279,41 @@ class SubmapGraph:
 
     def placed(self, moment: Moment) -> Floats:
         """Return the ring's pose in the map frame at a moment, as known now, x, y (m) and direction (rad)."""
+        return self._placed(moment.submap, moment.odometry)
+
+    def _placed(self, submap: int, odometry: Floats) -> Floats:
+        """Return poses (…, 3) of a map by odometry in the map frame."""
         submaps = self._submaps.archived_rows
         if not self.is_applied or len(submaps) == 0:
-            return moment.odometry
-        number = min(moment.submap, len(submaps) - 1)
-        moved = scaled(between(submaps[number]["pose"], moment.odometry), self._scales)
+            return odometry
+        number = min(submap, len(submaps) - 1)
+        moved = scaled(between(submaps[number]["pose"], odometry), self._scales)
         return compose(pose_of(self._nodes.archived_rows[number]), moved)
 
     def known_way(self) -> KnownWay:
-        """Return the maps of the way as known now, in the map frame; only matches that the others bear out."""
-        nodes, links = self._nodes.archived_rows, self._links.archived_rows
-        places = np.column_stack([nodes["x"], nodes["y"], np.zeros(len(nodes))])
+        """Return the way as known now, in the map frame; only matches that the others bear out.
+
+        It is the same object until half a metre more is known, or a map.
+        """
+        state = self._matched, self.count, self._trail_count // WAY_POSES
+        if self._way is None or self._way[0] != state:
+            self._way = state, self._known_way()
+        return self._way[1]
+
+    def _known_way(self) -> KnownWay:
+        nodes, links, submaps = self._nodes.archived_rows, self._links.archived_rows, self._submaps.archived_rows
+        maps = np.zeros((len(nodes), 5))
+        maps[:, 0], maps[:, 1] = nodes["x"], nodes["y"]
         if len(nodes):
-            places[:, 2] = np.sqrt(0.5 * spread_about(0, links, nodes)[:, 0])
+            maps[:, 2] = maps[:, 4] = 0.5 * spread_about(0, links, nodes)[:, 0]
         is_loop = (links["is_match"] != 0) & (links["by_scale"][:, OF_OTHER] != 0.0).any(axis=1)
         loops = links[is_loop & (links["weight"] > 0.5)]
-        return KnownWay(places, np.column_stack([places[loops["of"], :2], places[loops["to"], :2]]))
+        paths = scaled(submaps["path"], self._scales)
+        path = [compose(pose_of(node), of_map) for node, of_map in zip(nodes, paths, strict=True)]
+        path.append(self._placed(len(nodes), self._trail[: self._trail_count, :3]))
+        return KnownWay(
+            np.concatenate(path)[:, :2], maps, np.column_stack([maps[loops["of"], :2], maps[loops["to"], :2]])
+        )
 
     def localized(self) -> LocalizedPose:
         """Return where the robot was at the last firing, in the map frame."""

@@ -27,6 +27,8 @@ READING_RAD: Final = math.radians(6.0)
 """Difference of headings in `READING_M`."""
 SUBMAP_READINGS_MAX: Final = 512
 """Of one map, which ends with them."""
+PATH_PLACES: Final = 10
+"""Places of the ring that are kept of one map: they show its way to 0.3 m."""
 
 
 class Submap(Record):
@@ -40,6 +42,8 @@ class Submap(Record):
     count: Annotated[int, up_to(SUBMAP_READINGS_MAX)]
     readings: Annotated[Floats, SUBMAP_READINGS_MAX, 4, PLACE._replace(infinite=True)]
     """Sensor's place x, y (m), direction (rad), and range, m; infinite if silent."""
+    path: Annotated[Floats, PATH_PLACES, 3, PLACE]
+    """The ring's poses from its begin to its end by odometry, x, y (m) and direction (rad), which is not wrapped."""
 
 
 class Rows:
@@ -87,9 +91,10 @@ def between(of: Floats, to: Floats) -> Floats:
 
 
 def compose(of: Floats, by: Floats) -> Floats:
-    """Return the pose that lies at `by` in the frame of a pose."""
+    """Return the poses (…, 3) that lie at `by` in the frame of a pose."""
     c, s = math.cos(of[2]), math.sin(of[2])
-    return np.array([of[0] + c * by[0] - s * by[1], of[1] + s * by[0] + c * by[1], of[2] + by[2]])
+    x, y, turn = np.moveaxis(by, -1, 0)
+    return np.stack([of[0] + c * x - s * y, of[1] + s * x + c * y, of[2] + turn], axis=-1)
 
 
 def scaled(moved: Floats, scales: Floats) -> Floats:

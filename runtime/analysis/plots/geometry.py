@@ -93,12 +93,14 @@ def outline(seen: DetectedObject, model: ModelConfig | None, *, whole: bool) -> 
 
 def ellipse(seen: DetectedObject) -> Floats | None:
     """Return the 95 % confidence ellipse of an object's position as points (n, 2), m; None without a covariance."""
-    if seen.covariance is None:
-        return None
-    xx, xy, yy = seen.covariance
+    return None if seen.covariance is None else ellipse_95(seen.x, seen.y, *seen.covariance)
+
+
+def ellipse_95(x: float, y: float, xx: float, xy: float, yy: float) -> Floats:
+    """Return the ellipse that holds 95 % of a place with a covariance (m²) as points (n, 2), m."""
     values, vectors = np.linalg.eigh(np.array([[xx, xy], [xy, yy]]))
     axes = vectors * np.sqrt(CHI2_95 * np.maximum(values, 0.0))
-    around: Floats = circle(0.0, 0.0, 1.0) @ axes.T + np.array([seen.x, seen.y])
+    around: Floats = circle(0.0, 0.0, 1.0) @ axes.T + np.array([x, y])
     return around
 
 
@@ -107,8 +109,8 @@ def window(timeline: Timeline, frame: Frame) -> tuple[float, float, float, float
     margin = MARGIN_M / frame.unit_m
     reach = timeline.settings.body.radius_m / frame.unit_m + 0.3 * margin
     way = np.array([(m.pose.x, m.pose.y) for m in timeline.snapshots] or [(0.0, 0.0)])
-    if timeline.known_path is not None:
-        way = np.concatenate([way, timeline.known_path.places])
+    if timeline.known_way is not None:
+        way = np.concatenate([way, timeline.known_way.path])
     placed = frame.points(way)
     corners = [placed.min(axis=0) - reach, placed.max(axis=0) + reach]
     if timeline.world is not None:

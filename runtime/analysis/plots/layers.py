@@ -79,7 +79,7 @@ def draw_path(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) 
     (line,) = axes.plot(
         path[:, 0], path[:, 1], color=ROBOT, linewidth=1.6, linestyle=(0, (4, 2)), zorder=2, gid="path"
     )
-    line.set_label("path of the robot")
+    line.set_label("path by odometry")
     last = poses[-1]
     body = Circle((path[-1, 0], path[-1, 1]), radius_m / frame.unit_m, facecolor="none", edgecolor=ROBOT,
                   linewidth=1.6, zorder=5)  # fmt: skip

@@ -13,9 +13,10 @@ from matplotlib.lines import Line2D
 
 from config.load import load_world
 from config.units import FOOT_M
+from perception.detected_object import turned_object
 from runtime.analysis.plots.cross_arcs import heard_cross_paths
 from runtime.analysis.plots.geometry import Frame, window
-from runtime.analysis.plots.known_path import draw_known_path
+from runtime.analysis.plots.known_way import draw_known_way
 from runtime.analysis.plots.layers import (
     draw_arcs,
     draw_bookmarks,
@@ -132,15 +133,17 @@ def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
         side = format_length(known.cell_m, units, 2)
         line = f"cells of {side} {units}, in the window around the robot"
         drawn["grid"] = _figure(canvas, "Evidence grid", line, lambda axes: draw_evidence_grid(axes, known, frame))
-    if timeline.known_path is not None:
-        known_path = timeline.known_path
-        loops = counted(len(known_path.maps.loops), "loop closure")
-        line = f"{loops}; circles hold a map of the way in 95 %, seen from the first"
+    if timeline.known_way is not None:
+        known_way = timeline.known_way
+        loops = counted(len(known_way.loops), "loop closure")
+        line = f"{loops}; ellipses hold a map of the way in 95 %, seen from the first; walls as corrected"
+        to_map = timeline.odometry_from_map.inverse()
+        walls = tuple(turned_object(to_map, wall) for wall in last.walls)
         drawn["path"] = _figure(
             canvas,
             "Path before and after its correction",
             line,
-            lambda axes: draw_walls(axes, last.walls, frame) + draw_known_path(axes, known_path, frame),
+            lambda axes: draw_walls(axes, walls, frame) + draw_known_way(axes, known_way, frame),
         )
     return drawn
 

@@ -26,6 +26,7 @@ from perception.pipeline import Perception
 from perception.polyline import Polyline
 from runtime.console.frames.changing_rows import ChangingRows
 from runtime.console.frames.cross_path_rows import CrossPathRows
+from runtime.console.frames.known_way_row import KnownWayRow
 from runtime.console.frames.mission_rows import MissionRows
 from runtime.console.frames.segment_delta import SegmentDelta
 from runtime.console.frames.state_message import (
@@ -96,7 +97,7 @@ class EncodedFrame(NamedTuple):
     head: bytes
     """Everything but the map and what differs between clients, without the closing brace."""
     changes: bytes
-    """The map's fields: segments that came or went since the last one; objects left behind, polylines if changed."""
+    """The map's fields: segments that came or went since the last one; of the others those that have changed."""
     whole: Callable[[], bytes]
     """Returns the map's fields whole; valid while this is the newest frame of its source."""
 
@@ -135,6 +136,7 @@ class FrameEncoder:
         """Of the last frame."""
         self._archived = ChangingRows(_object)
         self._polylines = ChangingRows(_polyline)
+        self._way = KnownWayRow()
 
     def adopt(self, settings: Settings) -> None:
         """Use other settings from the next frame on."""
@@ -205,11 +207,7 @@ class FrameEncoder:
         if odometry is not None:
             _set_odometry(head, odometry)
         self._fired.clear()
-        changes = b'"segments":%b' % segments
-        if self._archived.update(state.perception.archived_objects()):
-            changes += b',"archived":%b' % self._archived.json
-        if self._polylines.update(state.perception.polylines()):
-            changes += b',"polylines":%b' % self._polylines.json
+        changes = b'"segments":%b' % segments + self._changed(state.perception)
         return EncodedFrame(self, self._number, orjson.dumps(head)[:-1], changes, self._whole)
 
     def ranges(self) -> list[float | None]:
@@ -245,11 +243,23 @@ class FrameEncoder:
                 return self._mission.row(drive_request)
         return {"kind": "legs"}
 
+    def _changed(self, perception: Perception) -> bytes:
+        """Return those of the map's other fields that have changed, each after a comma."""
+        changed = b""
+        if self._archived.update(perception.archived_objects()):
+            changed += b',"archived":%b' % self._archived.json
+        if self._polylines.update(perception.polylines()):
+            changed += b',"polylines":%b' % self._polylines.json
+        if self._way.update(perception.map_frame.known_way()):
+            changed += b',"known_way":%b' % self._way.json
+        return changed
+
     def _whole(self) -> bytes:
-        return b'"segments":%b,"archived":%b,"polylines":%b' % (
+        return b'"segments":%b,"archived":%b,"polylines":%b,"known_way":%b' % (
             self._segments.whole(),
             self._archived.json,
             self._polylines.json,
+            self._way.json,
         )
 
     def _encode_segments(self, state: State, *, may_wait: bool) -> bytes:

@@ -174,6 +174,17 @@ class LocalizedRow(TypedDict):
     """The map's origin in odometry's frame."""
 
 
+class WayRow(TypedDict):
+    """The way as it is known now by maps of a few metres of it, in the map frame; empty where none corrects it."""
+
+    path: list[Pair]
+    """Places of the ring along it."""
+    maps: list[tuple[float, float, float, float, float]]
+    """x, y of the middle of each map, and their covariance xx, xy, yy."""
+    loops: list[Quad]
+    """Loop closures: x, y of one map and of the other."""
+
+
 class PlaybackRow(TypedDict):
     """The position in the recording that is shown."""
 
@@ -236,5 +247,6 @@ class StateMessage(StateHead):
     segments: SegmentRows
     archived: NotRequired[list[ObjectRow]]
     polylines: NotRequired[list[PolylineRow]]
+    known_way: NotRequired[WayRow]
     dropped: int
     controller: bool

@@ -2,6 +2,7 @@
 // The robot and what moves it: body and heading, the trail, each schema's vector with its name, their sum, the goal.
 
 import { ellipseOf } from "./draw_objects.js";
+import { ofPlane } from "./map_frame.js";
 import { addHeading, addLine, pairOf, textWithHalo, overlap } from "./scene.js";
 import { magnitude } from "./units.js";
 
@@ -33,6 +34,44 @@ export function trailDrawer() {
     ctx.globalAlpha = 0.8;
     ctx.stroke(path);
   };
+}
+
+// The way as it is known now, which lies in the map frame: its path to where the robot is, the ellipses of its maps, and
+// the loop closures.
+/** @param {Drawing} f */
+export function drawKnownWay(f) {
+  const { ctx, run, px, theme } = f,
+    { path, maps, loops } = run.knownWay;
+  if (!run.fresh || run.state.localized === null || path.length === 0) return;
+  const { frame } = run.state.localized;
+  const line = new Path2D(),
+    ellipses = new Path2D(),
+    closures = new Path2D();
+  addLine(line, [...path, ofPlane(frame, run.state.pose[0], run.state.pose[1])]);
+  for (const [x, y, ...covariance] of maps) {
+    const { major, minor, angle } = ellipseOf(covariance);
+    if (!(major > 0)) continue; // the first map is where it is
+    ellipses.moveTo(x + major * Math.cos(angle), y + major * Math.sin(angle));
+    ellipses.ellipse(x, y, major, minor, angle, 0, 2 * Math.PI);
+  }
+  for (const [x1, y1, x2, y2] of loops)
+    addLine(closures, [
+      [x1, y1],
+      [x2, y2],
+    ]);
+  f.inWorld();
+  ctx.translate(frame[0], frame[1]);
+  ctx.rotate(frame[2]);
+  ctx.strokeStyle = theme.ellipse;
+  ctx.lineWidth = px;
+  ctx.stroke(ellipses);
+  ctx.strokeStyle = theme.ink;
+  ctx.lineJoin = "round";
+  ctx.lineWidth = 1.5 * px;
+  ctx.stroke(line);
+  ctx.strokeStyle = theme.cluster;
+  ctx.lineWidth = 1.5 * px;
+  ctx.stroke(closures);
 }
 
 /** @param {Drawing} f */

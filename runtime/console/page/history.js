@@ -24,6 +24,7 @@ const LEFT_OUT = new Set([
   "segments",
   "archived",
   "polylines",
+  "known_way",
   "steps",
   "way",
   "number",

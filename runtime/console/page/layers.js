@@ -7,7 +7,15 @@ import { drawCrossPaths } from "./draw_cross_paths.js";
 import { drawArcs, drawBeams } from "./draw_echoes.js";
 import { drawEvidenceGrid } from "./draw_evidence.js";
 import { drawGrid, drawScale, drawTruth } from "./draw_grid.js";
-import { drawMapFrame, drawRobot, drawVectors, drawGoal, drawValley, trailDrawer } from "./draw_motion.js";
+import {
+  drawKnownWay,
+  drawMapFrame,
+  drawRobot,
+  drawVectors,
+  drawGoal,
+  drawValley,
+  trailDrawer,
+} from "./draw_motion.js";
 import { drawMission } from "./draw_mission.js";
 import { drawPlaces } from "./draw_places.js";
 import {
@@ -113,6 +121,15 @@ const TABLE = [
     "stop",
   ],
   ["trail", "front", "trail", trailDrawer(), true, "M4 15c8-12 14 6 32-9", "robot"],
+  [
+    "known_way",
+    "front",
+    "way as corrected by its maps: path, 95 % ellipse of each map, loop closures",
+    drawKnownWay,
+    true,
+    "M4 15c8-12 14 6 32-9M20 6l12 9M10 6a4 3 0 1 1-.1 0Z",
+    "ink",
+  ],
   ["robot", "front", "robot", drawRobot, true, "M20 2a8 8 0 1 1-.1 0Zm8 8-12-4 3 4-3 4z", "robot"],
   [
     "map_frame",

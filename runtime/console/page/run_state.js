@@ -97,6 +97,8 @@ export class RunState extends Emitter {
   archived = []; // objects left behind; a frame lists them when they have changed
   /** @type {PolylineRow[]} */
   polylines = []; // outlines of what is not straight, likewise
+  /** @type {WayRow} */
+  knownWay = { path: [], maps: [], loops: [] }; // the way as maps of it correct it, likewise
   /** @type {Map<number, Segment>} */
   segments = new Map();
   segmentsVersion = 0;
@@ -183,6 +185,7 @@ export class RunState extends Emitter {
     const before = this.state;
     this.archived = frame.archived ?? this.archived;
     this.polylines = frame.polylines ?? this.polylines;
+    this.knownWay = frame.known_way ?? this.knownWay;
     const shown = { ...EMPTY, ...frame };
     const objects = [...shown.objects, ...this.archived]
       .sort((a, b) => (a.number ?? Infinity) - (b.number ?? Infinity)) // frames list them by score, which changes

@@ -13,7 +13,6 @@ from config.settings import LocalizationConfig
 from drivers.messages import Firing, Pose
 from perception.detected_object import DetectedObject
 from perception.edits import Arc, ClearMap, Evidence, Line, PlaceModel
-from perception.localization.localized_pose import KnownWay
 from perception.localization.map_frame import MapFrame
 from perception.map_moves import MapMoves
 from perception.pipeline import Perception
@@ -157,17 +156,11 @@ def test_maps_of_the_way_move_the_frame_in_which_firings_are_entered() -> None:
     assert noted == [(0, False)]
 
 
-def test_the_known_way_lies_in_odometrys_frame_of_now(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_way_is_known_once_maps_of_it_correct_odometry() -> None:
     frame = MapFrame(SETTINGS.ring, SETTINGS.models)
     assert frame.known_way() is None
     frame.submaps.is_applied = True
-    way = KnownWay(np.array([[1.0, 0.0, 0.1]]), np.array([[0.0, 0.0, 1.0, 0.0]]))
-    monkeypatch.setattr(frame.submaps, "known_way", lambda: way)
-    monkeypatch.setattr(frame.submaps, "odometry_from_map", lambda: Pose(1.0, 2.0, 0.5 * math.pi))
-    known = frame.known_way()
-    assert known is not None
-    np.testing.assert_allclose(known.places, [[1.0, 3.0, 0.1]])
-    np.testing.assert_allclose(known.loops, [[1.0, 2.0, 1.0, 3.0]])
+    assert frame.known_way() is frame.submaps.known_way()
 
 
 def test_without_recognition_the_pose_is_odometrys() -> None:

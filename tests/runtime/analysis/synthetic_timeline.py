@@ -18,7 +18,6 @@ from runtime.analysis.timeline import (
     BookmarkEntry,
     Cluster,
     Echoes,
-    KnownPath,
     LogEntry,
     ModeEntry,
     RunSnapshot,
@@ -87,11 +86,11 @@ def with_grid(timeline: Timeline) -> Timeline:
     return timeline
 
 
-def with_known_path(timeline: Timeline) -> Timeline:
-    """Return the timeline with a path as known at the end, by three maps of the way and one loop closure."""
-    places = np.array([[0.0, 0.0, 0.0], [0.5, 0.1, 0.05], [1.0, 0.3, 0.1]])
-    maps = KnownWay(places, np.array([[0.0, 0.0, 1.0, 0.3]]))
-    timeline.known_path = KnownPath(np.array([[0.0, 0.0], [0.5, 0.1], [1.0, 0.3]]), maps)
+def with_known_way(timeline: Timeline) -> Timeline:
+    """Return the timeline with a way as known at the end, by three maps of it and one loop closure."""
+    path = np.array([[0.0, 0.0], [0.5, 0.1], [1.0, 0.3]])
+    spreads = np.array([[0.0, 0.0, 0.0], [0.003, 0.001, 0.002], [0.01, 0.0, 0.01]])
+    timeline.known_way = KnownWay(path, np.column_stack([path, spreads]), np.array([[0.0, 0.0, 1.0, 0.3]]))
     return timeline
 
 

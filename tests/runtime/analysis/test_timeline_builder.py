@@ -139,7 +139,11 @@ class CorrectedFrame(OdometryFrame):
 
     def known_way(self) -> KnownWay:
         """Return the maps of the way."""
-        return KnownWay(np.zeros((1, 3)), np.zeros((0, 4)))
+        return KnownWay(np.array([[0.9, 0.0], [2.0, 0.0]]), np.zeros((1, 5)), np.zeros((0, 4)))
+
+    def odometry_from_map(self) -> Pose:
+        """Return the pose of the map frame in odometry's."""
+        return Pose(1.0, 0.0, 0.0)
 
     def moved_since(self, moment: Moment) -> Pose:
         """Return how what was heard then moves."""
@@ -160,5 +164,6 @@ def test_echoes_are_also_at_poses_as_known_at_the_end(timeline: Timeline) -> Non
     moved = timeline.known_echoes["x"] - timeline.echoes["x"]
     assert moved.tolist() == pytest.approx([-0.1, 0.0, 0.0, 0.0])
     assert timeline.echoes["x"].tolist() == pytest.approx([k + RADIUS_M for k in (1.0, 2.0, 2.0, 3.0)])
-    assert timeline.known_path is not None
-    assert timeline.known_path.places.tolist() == pytest.approx(np.array([[0.9, 0.0], [2.0, 0.0]]))
+    assert timeline.known_way is not None
+    assert timeline.known_way.path.tolist() == [[0.9, 0.0], [2.0, 0.0]]
+    assert timeline.odometry_from_map == Pose(1.0, 0.0, 0.0)

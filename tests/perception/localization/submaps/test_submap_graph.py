@@ -86,12 +86,16 @@ def test_drift_is_corrected(way: float, turn: float) -> None:
     error = now[-1, :2] - truth[-1, :2]
     assert error @ np.linalg.inv(here.covariance[:2, :2]) @ error < 16.0
     known = graph.known_way()
-    assert len(known.places) == graph.count
-    assert known.places[0, 2] == 0.0
-    assert known.places[1:, 2].min() > 0.0
+    assert graph.known_way() is known, "nothing has changed"
+    assert len(known.maps) == graph.count
+    assert known.maps[0, 2:].tolist() == [0.0, 0.0, 0.0]
+    assert np.linalg.eigvalsh(known.maps[1:, [2, 3, 3, 4]].reshape(-1, 2, 2)).min() > 0.0
     assert len(known.loops) > 0
     for place in known.loops.reshape(-1, 2):
-        assert np.abs(known.places[:, :2] - place).sum(axis=1).min() == 0.0
+        assert np.abs(known.maps[:, :2] - place).sum(axis=1).min() == 0.0
+    apart = np.hypot(*(end[:, None, :2] - known.path[None]).transpose(2, 0, 1))
+    assert apart.min(axis=1).max() < 0.35, "the path passes all places of the drive"
+    assert apart.min(axis=0).max() < 0.05, "and no others"
 
 
 def test_exact_odometry_is_left_alone() -> None:

@@ -13,7 +13,7 @@ from config.load import load_world
 from runtime.analysis.plots.figure_files import styled, svg_of
 from runtime.analysis.plots.paper_figures import HEIGHT_MAX_IN, HEIGHT_MIN_IN, Canvas, paper_figures, pictures
 from runtime.analysis.plots.plot_style import WIDTH_IN
-from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_cross_paths, with_grid, with_known_path
+from tests.runtime.analysis.synthetic_timeline import synthetic_timeline, with_cross_paths, with_grid, with_known_way
 
 RUN = synthetic_timeline()
 
@@ -59,7 +59,7 @@ def test_the_evidence_grid_lies_in_the_figure_where_it_lay() -> None:
 
 
 def test_a_corrected_path_has_a_figure() -> None:
-    drawn = pictures(with_known_path(synthetic_timeline()), "ft")
+    drawn = pictures(with_known_way(synthetic_timeline()), "ft")
     assert list(drawn) == ["raw", "segments", "clusters", "models", "path"]
     assert {"path", "known-path", "loops", "certainty"} <= gids(drawn["path"])
     assert any("1 loop closure;" in text.get_text() for text in drawn["path"].findobj(Text))
