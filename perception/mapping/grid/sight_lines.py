@@ -46,6 +46,11 @@ LOCATED_RAD: Final = 0.07
 """Greatest angle off the line on which an echo from something recognised came, rad. In three random rooms with
 doorways, among mirrors with late strays, 0.5 and 1.5 % of the cells called free are out of reach with 0.05 and 0.1,
 and 5 % with the whole beam."""
+LOCATED_CELLS: Final = 1.0
+"""Nor farther off it than this, cells: what is recognised is known to centimetres, and far away a beam as wide as
+`LOCATED_RAD` to a corner crosses the walls beside it. In twenty rooms of mirrors (seeds 900 to 919) .65 % of the
+cells called free were out of reach without this and .13 % with it, 3.31 and .69 % in the worst room; of the reachable
+cells it takes .7 points from what is called free."""
 PLACES_MIN: Final = 6
 """Where slanting walls answer, a cell was crossed if echoes passed it from so many places. Twice as many change what
 is out of reach by less than 0.2 %."""
@@ -226,7 +231,7 @@ def enter_sights(
                 kept[NOW] = max(int(kept[NOW]), int(UNITS_PER_LINE * shares[ray]))
                 if is_located:
                     off = math.asin(min(1.0, max(-1.0, across)) * sine)
-                    if abs(off - bearings[i]) <= LOCATED_RAD:
+                    if abs(off - bearings[i]) <= min(LOCATED_RAD, LOCATED_CELLS * cell_m / max(d, 1e-12)):
                         kept[LINE] = 1
 
 

@@ -112,6 +112,22 @@ def test_an_echo_proves_its_own_line_and_elsewhere_little(
         assert elsewhere == (has_line or (has_count and place >= PLACES_MIN))
 
 
+def test_a_line_to_something_recognised_is_no_wider_far_away() -> None:
+    """A corner's echo from 4 m away opened cells behind the wall that ends there."""
+    lines, _ = make()
+    lines.observe(
+        fire([3.9, math.nan, math.nan], 0.0, 0.05),
+        np.array([0.0, math.nan, math.nan]),
+        1,
+        np.zeros((128, 128), np.bool_),
+    )
+    crossed = lines.crossed(1.0)
+    far = 64 + 36
+    assert math.atan2(2.0, 35.0) < LOCATED_RAD
+    assert crossed[64, far]
+    assert not crossed[64 + 2, far]
+
+
 def test_an_echo_from_what_the_grid_holds_opens_its_lines_as_far_as_such_echoes_are_believed() -> None:
     lines, window = make()
     holds = np.zeros((128, 128), np.bool_)
