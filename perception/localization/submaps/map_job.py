@@ -18,7 +18,7 @@ from perception.localization.submaps.local_grid import (
 )
 from perception.localization.submaps.map_match import Match, best_match
 from perception.localization.submaps.pose_graph import (
-    GRAPH_SCALE_SIGMA,
+    GRAPH_SCALE_SIGMAS,
     OF_ODOMETRY,
     SCALES,
     Link,
@@ -190,10 +190,8 @@ def _solve(maps: Maps, *, is_new: bool) -> Iterator[Outcome | None]:
             maps.nodes[name] += step[SCALES + k :: 3]
         if np.abs(step).max() < STEP_MIN:
             break
-    cost = (
-        linearise(links, count, nodes, scales, jacobians, residuals)
-        + 0.5 * float(scales @ scales) / GRAPH_SCALE_SIGMA**2
-    )
+    off = scales / GRAPH_SCALE_SIGMAS
+    cost = linearise(links, count, nodes, scales, jacobians, residuals) + 0.5 * float(off @ off)
     of_odometry = maps.links["is_match"] == 0
     off = residuals[of_odometry]
     cost += 0.5 * float(np.einsum("ij,ijk,ik->", off, maps.links["information"][of_odometry], off))
@@ -205,7 +203,7 @@ def _cost_at_odometry(maps: Maps, jacobians: Floats, residuals: Floats) -> float
     exact, scales, links = zeros(Node, len(maps.nodes)), np.zeros(SCALES), maps.links
     exact["x"], exact["y"], exact["theta"] = maps.submaps["pose"].T
     by_scale = links["by_scale"][:, OF_ODOMETRY:]
-    prior = np.eye(SCALES - OF_ODOMETRY) / GRAPH_SCALE_SIGMA**2
+    prior = np.diag(1.0 / np.square(GRAPH_SCALE_SIGMAS[OF_ODOMETRY:]))
     cost = math.inf
     for _ in range(LOST_STEPS):
         cost = linearise(records(Link, links), len(links), records(Node, exact), scales, jacobians, residuals)

@@ -23,8 +23,9 @@ OF_ODOMETRY: Final = 2
 """The first so many of them are odometry's."""
 OF_OTHER: Final = 3
 """The one of matches with another map than the one before."""
-GRAPH_SCALE_SIGMA: Final = 0.03
-"""Standard deviation of each before any match."""
+GRAPH_SCALE_SIGMAS: Final = (0.03, 0.03, 0.01, 0.01)
+"""Standard deviation of each before any match. What a match may lose cannot be told from odometry's scale along a
+way: with 0.03 the error at the end of 24 drives in buildings is 0.41 m in place of 0.2; with 0.005 it is the same."""
 CAUCHY: Final = 2.0
 """A match that is off by so many standard deviations counts half."""
 
@@ -126,7 +127,7 @@ def multiply(links: Records[Link], count: int, jacobians: Floats, given: Floats,
     """
     result[:] = 0.0
     for k in range(SCALES):
-        result[k] = given[k] / GRAPH_SCALE_SIGMA**2
+        result[k] = given[k] / GRAPH_SCALE_SIGMAS[k] ** 2
     for m in range(count):
         of, to, j, weight = SCALES + 3 * links[m].of, SCALES + 3 * links[m].to, jacobians[m], links[m].weight
         information = links[m].information
@@ -173,7 +174,7 @@ def begin_step(
     vectors[:] = 0.0
     left, diagonal = vectors[1], vectors[4]
     for k in range(SCALES):
-        left[k], diagonal[k] = -scales[k] / GRAPH_SCALE_SIGMA**2, 1.0 / GRAPH_SCALE_SIGMA**2
+        left[k], diagonal[k] = -scales[k] / GRAPH_SCALE_SIGMAS[k] ** 2, 1.0 / GRAPH_SCALE_SIGMAS[k] ** 2
     for m in range(count):
         link, j, r = links[m], jacobians[m], residuals[m]
         for column in range(6 + SCALES):

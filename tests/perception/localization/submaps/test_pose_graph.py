@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from perception.kernel import Floats
 from perception.localization.submaps.pose_graph import (
-    GRAPH_SCALE_SIGMA,
+    GRAPH_SCALE_SIGMAS,
     SCALES,
     Link,
     Node,
@@ -80,9 +80,9 @@ def test_a_step_is_that_of_dense_algebra() -> None:
     jacobians, residuals = np.empty((len(links), 3, 6 + SCALES)), np.empty((len(links), 3))
     linearise(held, len(links), at, scales, jacobians, residuals)
     matrix = np.zeros((size, size))
-    matrix[range(SCALES), range(SCALES)] = 1.0 / GRAPH_SCALE_SIGMA**2
+    matrix[range(SCALES), range(SCALES)] = 1.0 / np.square(GRAPH_SCALE_SIGMAS)
     gradient = np.zeros(size)
-    gradient[:SCALES] = -scales / GRAPH_SCALE_SIGMA**2
+    gradient[:SCALES] = -scales / np.square(GRAPH_SCALE_SIGMAS)
     for link, part, residual in zip(links, jacobians, residuals, strict=True):
         whole = np.zeros((3, size))
         whole[:, SCALES + 3 * link["of"] : SCALES + 3 * link["of"] + 3] = part[:, :3]
@@ -136,8 +136,8 @@ def test_a_wrong_match_loses_its_weight() -> None:
     links, nodes = np.concatenate([links, *right, wrong]), at_poses(poses)
     solve(links, nodes, 20)
     assert links["weight"][-1] < 0.05
-    np.testing.assert_allclose(nodes["x"], [pose[0] for pose in poses], atol=0.05)
-    np.testing.assert_allclose(nodes["y"], [pose[1] for pose in poses], atol=0.05)
+    np.testing.assert_allclose(nodes["x"], [pose[0] for pose in poses], atol=0.08)
+    np.testing.assert_allclose(nodes["y"], [pose[1] for pose in poses], atol=0.08)
 
 
 def test_what_lies_farther_along_the_chain_is_less_certain() -> None:
