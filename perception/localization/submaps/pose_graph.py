@@ -24,7 +24,7 @@ OF_ODOMETRY: Final = 2
 OF_OTHER: Final = 3
 """The one of matches with another map than the one before."""
 GRAPH_SCALE_SIGMAS: Final = (0.03, 0.03, 0.01, 0.01)
-"""Standard deviation of each before any match. What a match may lose cannot be told from odometry's scale along a
+"""Standard deviation of each before any match. What a match may lose and the scale of odometry look alike along a
 way: with 0.03 the error at the end of 24 drives in buildings is 0.41 m in place of 0.2; with 0.005 it is the same."""
 CAUCHY: Final = 2.0
 """A match that is off by so many standard deviations counts half."""
