@@ -29,7 +29,7 @@ Heading: TypeAlias = Literal[
     "y-down-south-cw",
 ]
 AngleUnit: TypeAlias = Literal["auto", "rad", "deg"]
-TimeUnit: TypeAlias = Literal["auto", "s", "ms", "us", "ns"]
+TimeUnit: TypeAlias = Literal["auto", "s", "ms", "us", "ns", "min", "h", "d"]
 LengthUnit: TypeAlias = Literal["auto", "m", "cm", "mm", "in", "ft"]
 
 
@@ -50,7 +50,7 @@ class RingLogOptions:
     angle_unit
         Ring logs: unit of theta and ring_yaw.
     time_unit
-        Ring logs: unit of t.
+        Ring logs: unit of t; d, days, as spreadsheets and MATLAB have them.
     length_unit
         Ring logs: unit of x and y.
     range_unit

@@ -13,7 +13,9 @@ from config.units import FOOT_M
 from drivers.messages import Floats
 
 ANGLES: Final = MappingProxyType[str, float]({"rad": 1.0, "deg": math.pi / 180.0})
-TIMES: Final = MappingProxyType[str, float]({"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9})
+TIMES: Final = MappingProxyType[str, float](
+    {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0}
+)
 LENGTHS: Final = MappingProxyType[str, float]({"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": FOOT_M})
 
 

@@ -78,6 +78,9 @@ PAIRS_BIAS_LN: Final = 0.14
 drives it was between -0.30 and 0.26."""
 PAIRS_BIASES: Final = np.linspace(-3.0, 3.0, 61)
 """Where this bias is looked at, in its standard deviations."""
+IMPERIAL: Final = ("in", "ft")
+TWICE: Final = 2.0
+"""Ranges change by this much of the way where the whole path of the sound was written down, there and back."""
 STEPS_MIN: Final = 30
 """Steps on which a speed or a rate rests."""
 ECHOES_MIN: Final = 50
@@ -127,34 +130,25 @@ def find_units(
     RingLogError
         No combination fits the robot, or several do.
     """
-    choices = [
-        Units(t, length, range_)
-        for t, length, range_ in itertools.product(
-            _choice(options.time_unit, TIMES),
-            _choice(options.length_unit, LENGTHS),
-            _choice(options.range_unit, LENGTHS),
-        )
-    ]
+    given = (options.time_unit, options.length_unit, options.range_unit)
+    facts = _Facts.of(table, silence, angle)
+    times = [one for one in TIMES if TIMES[one] <= 1.0 or facts.speed > 0.0]  # on the spot, minutes look like degrees
+    choices = [Units(*one) for one in itertools.product(*map(_choice, given, (times, LENGTHS, LENGTHS)))]
     if len(choices) == 1:
         return choices[0], {choices[0]: 0.0}
-    facts = _Facts.of(table, silence, angle)
     ways = {pair: _way_score(ratios, LENGTHS[pair[0]] / LENGTHS[pair[1]]) for pair in {one[1:] for one in choices}}
     scores = {units: _units_score(units, facts, robot) + ways[units[1:]] for units in choices}
     best = max(scores, key=scores.__getitem__)
-    default = Units(
-        *(
-            given if given != "auto" else plain
-            for given, plain in zip(
-                (options.time_unit, options.length_unit, options.range_unit), Units(), strict=True
-            )
-        )
-    )
+    default = Units(*(plain if one == "auto" else one for one, plain in zip(given, Units(), strict=True)))
     rate_rad_s = facts.rate / TIMES[best.time]
     if options.angle_unit == "auto" and rate_rad_s > TURNS_FAST * robot.body.turn_max_rad_s:
         raise RingLogError(
             f"{_too_fast(rate_rad_s, robot)}: say --angle-unit deg if it is in degrees, or give it in radians"
         )
     if scores[default] > scores[best] - SURE_NAT:
+        best = default
+    _check_ways(best, ratios)
+    if best == default:
         return default, scores
     reason = _reason(default, best, facts, robot)
     if _contradictions(best, facts, robot):
@@ -237,6 +231,22 @@ class _Facts(NamedTuple):
         rate = float(np.median(turned[turns] / step[turns])) if turns.sum() >= STEPS_MIN else 0.0
         ceiling = silence.low if silence.is_top and silence.low == silence.high else None
         return _Facts(period, speed, rate, table.ranges[np.isfinite(table.ranges)], ceiling)
+
+
+def _check_ways(units: Units, ratios: Floats) -> None:
+    """Raise an error if ranges may change as the whole path of the sound does, there and back, and not as in `units`.
+
+    In one system of units that takes proof. Feet beside metres are as rare as the whole path: there it must not fit.
+    """
+    expected = LENGTHS[units.length] / LENGTHS[units.range_]
+    is_mixed = (units.length in IMPERIAL) != (units.range_ in IMPERIAL)
+    surely = _way_score(ratios, expected) + (-APART_NAT if is_mixed else PROOF_NAT)
+    if len(ratios) and max(_way_score(ratios, TWICE * one) for one in (expected, 1.0)) > surely:
+        raise RingLogError(
+            f"ranges change by {float(np.median(ratios)):.2g} for each unit of the way to what is heard: halve them "
+            "if they are the whole path of the sound, there and back; correct x and y if these are too small; or say "
+            f"{units.options} if both are right"
+        )
 
 
 def _way_score(ratios: Floats, expected: float) -> float:

@@ -14,6 +14,7 @@ from config.load import load_settings
 from drivers.messages import Firing, Pose
 from runtime.recording.conventions.options import AUTO
 from runtime.recording.conventions.reading import converted_firings
+from runtime.recording.conventions.silence import Silence
 from runtime.recording.conventions.table import LENGTHS, TIMES, Table
 from runtime.recording.conventions.units import (
     APART_NAT,
@@ -25,6 +26,7 @@ from runtime.recording.conventions.units import (
     _range_score,
     _reason,
     _way_score,
+    find_units,
     way_ratios,
 )
 from runtime.recording.ring_log import RingLogError
@@ -57,6 +59,33 @@ def test_ratios_of_a_wide_beam_leave_units_that_are_near(bias: float) -> None:
     near = _way_score(ratios / LENGTHS["in"], LENGTHS["ft"] / LENGTHS["cm"])
     assert near - scores["in"] < APART_NAT
     assert min(scores["in"] - scores["cm"], scores["in"] - scores["ft"]) > 12.0
+
+
+def found(drive: Drive, table: Table) -> Units:
+    ratios = way_ratios(table, drive.settings, table.pose[:, 3], 1)
+    return find_units(table, Silence(), drive.settings, AUTO, "rad", ratios)[0]
+
+
+@pytest.mark.parametrize(("place", "reach"), [(1.0, 2.0), (0.5, 1.0), (100.0, 200.0)], ids=["path", "half-way", "cm"])
+def test_ranges_that_are_the_whole_path_of_the_sound_are_refused(drive: Drive, place: float, reach: float) -> None:
+    """There and back is twice the way; no unit of length that fits by chance may take its place."""
+    table = Table(drive.t, drive.pose * [place, place, 1.0, 1.0], drive.ranges * reach)
+    with pytest.raises(RingLogError, match=r"halve them if.* or say --time-unit s --length-unit"):
+        found(drive, table)
+    with pytest.raises(RingLogError, match="halve them if"):
+        found(drive, in_units(replace(drive, ranges=2.0 * drive.ranges), Units("ms", "mm", "mm")))
+
+
+@pytest.mark.parametrize("unit", ["min", "h", "d"])
+def test_times_in_minutes_and_days_are_no_lengths_in_inches(drive: Drive, unit: str) -> None:
+    """A speed that is 60 times too large is one of inches, too; the ranges say which."""
+    assert found(drive, in_units(drive, Units(unit))) == Units(unit)
+
+
+@pytest.mark.parametrize("length", ["m", "cm", "ft"])
+def test_feet_beside_metres_are_found(drive: Drive, length: str) -> None:
+    units = Units("s", length, "ft")
+    assert found(drive, in_units(drive, units)) == units
 
 
 def test_ranges_that_end_at_the_rings_greatest_one_are_evidence() -> None:
