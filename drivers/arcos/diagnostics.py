@@ -51,6 +51,10 @@ SONAR_OFF: Final = (
     "turn it off: find it if this message returns"
 )
 
+OTHER_DISCS: Final = (
+    "the robot reports sonars, and none of those that the robot file lists, {} to {}: name the robot's own file, or "
+    "its numbers of the sonars in arcos.discs"
+)
 
 STOP_PRESSED: Final = (
     "the STOP button of the robot is pressed, which switches its motors off: release it, then arm again"
@@ -95,8 +99,9 @@ def wrong_robot(name: RobotName, config: RobotConfig) -> str | None:
     subclass, known = name.subclass, config.arcos.subclasses
     if not known or subclass is None or subclass.lower() in {one.lower() for one in known}:
         return None
+    model = f"is a {one_line(subclass)}" if subclass else "does not say of which model it is"
     return (
-        f"the robot '{one_line(name.name or '')}' is a {one_line(subclass)}, and the robot file is for "
+        f"the robot '{one_line(name.name or '')}' {model}, and the robot file is for "
         f"{', '.join(known)}, whose odometry has other factors; choose the robot's own file, or add its subclass to "
         f"arcos.subclasses"
     )

@@ -366,6 +366,8 @@ class ArcosDriver(Session[PoseStamper]):
         self._flags |= flags
         self._battery = sip.battery_10 or sip.battery
         self._firings += firings
+        if sip.sonar and {one.number for one in sip.sonar}.isdisjoint(self._discs):
+            self._note_once(diagnostics.OTHER_DISCS.format(min(self._discs), max(self._discs)))
         self._follow_status(SipFlags(sip.flags))
 
     def _begin_session(self, sip: Sip) -> None:

@@ -35,6 +35,10 @@ RANGE_ALLOWED: Final = "metres ≥ 0, 'inf' (fired, no echo) or an empty cell (d
 _CROSS: Final = re.compile(r"x(\d{2,3})_(\d{2,3})")
 """A column of half paths: transmitter, listener."""
 _SEPARATORS: Final = MappingProxyType({";": "semicolons", "\t": "tabs", " ": "spaces"})
+_PACKED: Final = MappingProxyType(
+    {b"\x1f\x8b": "gzip", b"PK": "zip, or a spreadsheet as xlsx", b"BZh": "bzip2", b"\xfd7zXZ": "xz"}
+)
+"""How files begin that hold others."""
 _NO_NUMBER: Final = frozenset({"", "none", "null", "na", "n/a", "#n/a"})
 """What programs write for a number that they do not have."""
 _SPELT_INF: Final = re.compile(r"\s*\+?inf(inity)?\s*", re.IGNORECASE)
@@ -87,6 +91,8 @@ def _lines(file: BinaryIO, path: Path) -> Iterator[str]:
             raise row_error(
                 path, row, f"is longer than {LINE_MAX_BYTES} bytes", "check that this is a ring log (CSV)"
             )
+        if row == 1 and (packed := next((name for magic, name in _PACKED.items() if raw.startswith(magic)), None)):
+            raise row_error(path, row, f"is compressed ({packed})", "unpack the file first")
         if b"\0" in raw:
             raise row_error(path, row, "holds NUL bytes, as binary files and UTF-16 do", "save it as CSV in UTF-8")
         try:

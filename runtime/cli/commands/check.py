@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from config.errors import DONE
+from config.errors import DONE, WRONG_CALL, UserError
 from runtime.cli.options import Sets
 
 
@@ -20,6 +20,8 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
     ------
     ConfigError
         The configuration is wrong; the message says what and where.
+    UserError
+        It is a run's data.
     FiringError
         Each value is valid, but the ring cannot carry out its firing pattern, or would not see where it drives.
     """
@@ -35,6 +37,12 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
     from runtime.support.config_lint import lint_settings
     from runtime.support.pattern_check import refuse_undrivable
 
+    if config.lower().endswith((".csv", ".mcap")):
+        raise UserError(
+            f"{config}: by its name it is a ring log or a recording, and check reads configurations (TOML): "
+            f"`echolocate replay {config}` reads it",
+            WRONG_CALL,
+        )
     settings = load_any(config, sets)
     if isinstance(settings, Settings):
         refuse_undrivable(settings)

@@ -28,10 +28,13 @@ def test_a_robot_of_the_files_models_or_without_a_name_is_accepted(subclass: str
     assert wrong_robot(RobotName("a", "Pioneer", subclass), P3DX_FILE) is None
 
 
-@pytest.mark.parametrize("subclass", ["p3at", "p3dx-sh", ""])
-def test_a_robot_with_other_factors_is_refused(subclass: str) -> None:
+@pytest.mark.parametrize(
+    ("subclass", "said"),
+    [("p3at", "is a p3at"), ("p3dx-sh", "is a p3dx-sh"), ("", "does not say of which model it is")],
+)
+def test_a_robot_with_other_factors_is_refused(subclass: str, said: str) -> None:
     message = wrong_robot(RobotName("a\x1b[2J", "Pioneer", subclass), P3DX_FILE) or ""
-    assert f"is a {subclass}, and the robot file is for p3dx, p2d8, p2d8+" in message
+    assert f"{said}, and the robot file is for p3dx, p2d8, p2d8+" in message
     assert "\x1b" not in message
 
 

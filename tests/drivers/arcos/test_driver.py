@@ -328,6 +328,16 @@ def test_ranges_become_firings_with_times_and_poses(harness: Harness) -> None:
     assert harness.driver.firings_waiting == 0
 
 
+def test_a_robot_with_none_of_the_files_sonars_is_named_once(harness: Harness) -> None:
+    """Its ranges were dropped, and the ring's power and cable blamed."""
+    harness.ready()
+    for disc in (16, 17, 18):
+        harness.controller.readings = (SonarReading(disc, 1000),)
+        harness.run(0.1)
+    (said,) = (note for note in harness.notes if "none of those that the robot file lists" in note)
+    assert "0 to 15" in said
+
+
 def test_a_new_pattern_is_sent_and_an_impossible_one_refused(harness: Harness) -> None:
     harness.ready()
     ring = P3DX_FILE.ring.model_copy(update={"firing": FiringConfig(sets=((0, 8), (4, 12)), step_period_s=0.05)})

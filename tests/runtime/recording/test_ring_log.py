@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import bz2
+import gzip
+import lzma
 import math
 import os
+import re
 import tracemalloc
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -211,6 +215,15 @@ def test_not_utf8_names_the_row_and_byte(tmp_path: Path) -> None:
 )
 def test_binary(tmp_path: Path, content: bytes) -> None:
     assert "holds NUL bytes" in error_message(log(tmp_path, content))
+
+
+@pytest.mark.parametrize(
+    ("pack", "name"),
+    [(gzip.compress, "gzip"), (bz2.compress, "bzip2"), (lzma.compress, "xz"), (b"PK".__add__, "xlsx")],
+)
+def test_compressed_files_are_named(tmp_path: Path, pack: Callable[[bytes], bytes], name: str) -> None:
+    text = error_message(log(tmp_path, pack(HEADER.encode() + b"0,0,0,0,1,1\n")))
+    assert re.fullmatch(rf"row 1 is compressed \(.*{name}\); unpack the file first", text)
 
 
 @pytest.mark.parametrize(

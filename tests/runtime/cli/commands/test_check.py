@@ -76,3 +76,10 @@ def test_a_line_too_slow_or_ranges_finer_than_it_are_wrong(capsys: pytest.Captur
         out, err = capsys.readouterr()
         assert out == ""
         assert said in err
+
+
+@pytest.mark.parametrize("name", ["drive.csv", "runs/drive.mcap"])
+def test_data_of_a_run_are_no_configuration(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """A ring log was "no such run", and by its path an invalid key in line 1."""
+    assert run_command(["check", name]) == WRONG_CALL
+    assert f"`echolocate replay {name}` reads it" in capsys.readouterr().err

@@ -77,6 +77,13 @@ def test_what_is_written_is_good_and_is_never_overwritten(
     assert [path.name for path in Path().iterdir()] == ["mine.toml"], "no draft is left"
 
 
+def test_the_check_that_is_proposed_finds_the_file(capsys: pytest.CaptureFixture[str]) -> None:
+    """A name without a slash or .toml is that of a shipped file."""
+    assert run_command(["init", "model", "mine", "--yes"]) == DONE
+    words = capsys.readouterr().out.rpartition("echolocate ")[2].split()
+    assert run_command(words) == DONE, capsys.readouterr().err
+
+
 @pytest.mark.parametrize("driver", ["denning", "arcos", "rflex"])
 def test_a_robot_that_is_described_with_the_defaults_can_be_driven(driver: str) -> None:
     """A Pioneer's own file was good for `check`, and its robot was refused for its watchdog."""

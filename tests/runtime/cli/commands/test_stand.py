@@ -42,5 +42,7 @@ def test_calls_that_show_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[s
         "nothing was fired up to --at 0.1 by the robot's clock; the first firing is at 0.50 s"
         in capsys.readouterr().err
     )
+    assert run_command(["stand", str(log), "--at", "60"]) == FAILED
+    assert "ends before --at 60 by the robot's clock; the last firing is at 0.50 s" in capsys.readouterr().err
     assert run_command(["stand", str(log)]) == FAILED
     assert "no surface was heard over three different paths" in capsys.readouterr().err
