@@ -78,6 +78,8 @@ PAIRS_BIAS_LN: Final = 0.14
 drives it was between -0.30 and 0.26."""
 PAIRS_BIASES: Final = np.linspace(-3.0, 3.0, 61)
 """Where this bias is looked at, in its standard deviations."""
+DENSE: Final = 0.5
+"""Rows closer than this share of the ring's steps may be in minutes, which would else excuse all that is too fast."""
 IMPERIAL: Final = ("in", "ft")
 TWICE: Final = 2.0
 """Ranges change by this much of the way where the whole path of the sound was written down, there and back."""
@@ -132,7 +134,8 @@ def find_units(
     """
     given = (options.time_unit, options.length_unit, options.range_unit)
     facts = _Facts.of(table, silence, angle)
-    times = [one for one in TIMES if TIMES[one] <= 1.0 or facts.speed > 0.0]  # on the spot, minutes look like degrees
+    is_dense = facts.period < DENSE * robot.ring.firing.step_period_s
+    times = [one for one in TIMES if TIMES[one] <= 1.0 or is_dense]
     choices = [Units(*one) for one in itertools.product(*map(_choice, given, (times, LENGTHS, LENGTHS)))]
     if len(choices) == 1:
         return choices[0], {choices[0]: 0.0}
@@ -234,10 +237,7 @@ class _Facts(NamedTuple):
 
 
 def _check_ways(units: Units, ratios: Floats) -> None:
-    """Raise an error if ranges may change as the whole path of the sound does, there and back, and not as in `units`.
-
-    In one system of units that takes proof. Feet beside metres are as rare as the whole path: there it must not fit.
-    """
+    """Raise an error if ranges are the whole path of the sound: surely, or maybe where the units mix two systems."""
     expected = LENGTHS[units.length] / LENGTHS[units.range_]
     is_mixed = (units.length in IMPERIAL) != (units.range_ in IMPERIAL)
     surely = _way_score(ratios, expected) + (-APART_NAT if is_mixed else PROOF_NAT)
