@@ -79,7 +79,7 @@ drives it was between -0.30 and 0.26."""
 PAIRS_BIASES: Final = np.linspace(-3.0, 3.0, 61)
 """Where this bias is looked at, in its standard deviations."""
 DENSE: Final = 0.5
-"""Rows closer than this share of the ring's steps may be in minutes, which would else excuse all that is too fast."""
+"""Rows closer than this share of the ring's steps may be in minutes, which else would excuse all that is too fast."""
 IMPERIAL: Final = ("in", "ft")
 TWICE: Final = 2.0
 """Ranges change by this much of the way where the whole path of the sound was written down, there and back."""
@@ -132,17 +132,15 @@ def find_units(
     RingLogError
         No combination fits the robot, or several do.
     """
-    given = (options.time_unit, options.length_unit, options.range_unit)
-    facts = _Facts.of(table, silence, angle)
-    is_dense = facts.period < DENSE * robot.ring.firing.step_period_s
-    times = [one for one in TIMES if TIMES[one] <= 1.0 or is_dense]
-    choices = [Units(*one) for one in itertools.product(*map(_choice, given, (times, LENGTHS, LENGTHS)))]
+    given, facts = (options.time_unit, options.length_unit, options.range_unit), _Facts.of(table, silence, angle)
+    known = (_times(facts.period, robot.ring.firing.step_period_s), LENGTHS, LENGTHS)
+    choices = [Units(*one) for one in itertools.product(*map(_choice, given, known))]
     if len(choices) == 1:
         return choices[0], {choices[0]: 0.0}
     ways = {pair: _way_score(ratios, LENGTHS[pair[0]] / LENGTHS[pair[1]]) for pair in {one[1:] for one in choices}}
     scores = {units: _units_score(units, facts, robot) + ways[units[1:]] for units in choices}
     best = max(scores, key=scores.__getitem__)
-    default = Units(*(plain if one == "auto" else one for one, plain in zip(given, Units(), strict=True)))
+    default = Units(*(_choice(one, [plain])[0] for one, plain in zip(given, Units(), strict=True)))
     rate_rad_s = facts.rate / TIMES[best.time]
     if options.angle_unit == "auto" and rate_rad_s > TURNS_FAST * robot.body.turn_max_rad_s:
         raise RingLogError(
@@ -156,8 +154,8 @@ def find_units(
     reason = _reason(default, best, facts, robot)
     if _contradictions(best, facts, robot):
         raise RingLogError(reason)
-    rivals = [units for units in choices if units != best and scores[units] > scores[best] - APART_NAT]
-    rivals = [units for units in rivals if not _is_same(units, best, facts)]
+    near = (units for units in choices if units != best and scores[units] > scores[best] - APART_NAT)
+    rivals = [units for units in near if not _is_same(units, best, facts)]
     if rivals:
         names = " or ".join(f"{units.words} ({units.options})" for units in [best, *rivals[:2]])
         raise RingLogError(f"cannot have {default.words} ({reason}); it may have {names}")
@@ -202,6 +200,10 @@ def check_scale(units: Units, scores: dict[Units, float], echoes: Callable[[Unit
 
 def _choice(given: str, known: Iterable[str]) -> list[str]:
     return [given] if given != "auto" else list(known)
+
+
+def _times(period: float, step_s: float) -> list[str]:
+    return [name for name, unit in TIMES.items() if unit <= 1.0 or period < DENSE * step_s]
 
 
 class _Facts(NamedTuple):
