@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.bayes.memory.elements import round_label
+from perception.bayes.memory.parameters import RIVAL_RADII_M
 from perception.detected_object import DetectedObject, wall_between
 from perception.kernel import Floats
 from perception.mapping.no_surfaces import SurfaceReport
@@ -37,9 +40,11 @@ CORNER_REACH_M: Final = 0.25
 LEFTOVER_M: Final = 0.2
 """So near what is known a piece may be what is left of its echoes. Share of pieces so near: 0.91 and more in
 generated rooms, 0.51 and less on drives; within 0.1 m it is 0.66 and 0.39."""
-UNSURE, AWAY, NEAR, ALONG, ON_BODY = range(-1, 4)
+UNSURE, AWAY, NEAR, ALONG, ON_BODY, ON_MODEL = range(-1, 5)
 """How near a place is to what is known: perhaps on an unknown object, which may be as large as the largest body and
-is not known; within `LEFTOVER_M` of what is; along a wall or around a corner; on a body."""
+is not known; within `LEFTOVER_M` of what is; along a wall or around a corner; on a post or barrel; on a model."""
+RIVALS_M: Final = MappingProxyType({round_label(radius): radius for radius in RIVAL_RADII_M if radius > 0.0})
+"""Radii of the round bodies that are no models, by their labels, m."""
 STRAIGHT_M: Final = 1.0
 """Length of the straight pieces for whose evidence walls are expected at all."""
 STRAIGHT_NAT: Final = 15.0
@@ -56,7 +61,7 @@ Runs = list[tuple[float, float]]
 def nearness(
     rows: Structured, known: tuple[DetectedObject, ...], reach_m: Mapping[str, float]
 ) -> NDArray[np.int64]:  # fmt: skip
-    """Return how near places along surfaces are to what is known, from `UNSURE` to `ON_BODY`, shape (n, PLACES).
+    """Return how near places along surfaces are to what is known, from `UNSURE` to `ON_MODEL`, shape (n, PLACES).
 
     Parameters
     ----------
@@ -69,6 +74,7 @@ def nearness(
     """
     walls = np.array([one.ends for one in known if one.ends is not None]).reshape(-1, 4)
     bodies, body_reaches = _bodies(known, reach_m)
+    models, model_reaches = _bodies(known, {name: reach for name, reach in reach_m.items() if name not in RIVALS_M})
     unknown, unknown_reaches = _bodies(known, {UNKNOWN: max(reach_m.values(), default=0.0)})
     corners, corner_reaches = _bodies(known, dict.fromkeys(CORNERS, CORNER_REACH_M))
     every = np.concatenate([walls, bodies, corners])
@@ -78,6 +84,7 @@ def nearness(
     for how_near, ends, within in (
         (UNSURE, unknown, unknown_reaches + AGREES_M), (NEAR, every, reaches + LEFTOVER_M),
         (ALONG, every, reaches + AGREES_M), (ON_BODY, bodies, body_reaches + AGREES_M),
+        (ON_MODEL, models, model_reaches + AGREES_M),
     ):  # fmt: skip
         marks = np.zeros(len(places), np.int64)
         find_near(places, ends, within, marks)
@@ -118,8 +125,13 @@ def beside_known(rows: Structured, near: NDArray[np.int64], prior: float) -> Sur
         for begin, end in runs
         if (end - begin) * length_m >= PIECE_KEPT_M
     ]
-    rest = ~is_wall & free.any(axis=1)
-    return SurfaceReport(tuple(found), tuple(_polylines(rows[rest])), prior > 0.0)
+    rest = rows[~is_wall & free.any(axis=1)]
+    if prior > 0.0:
+        # Where shapes explain little, what is on a post or barrel is no wall, but an outline: no result has the body.
+        on_body = near == ON_BODY
+        rest = rows[~is_wall & (free | on_body).any(axis=1)]
+        rest = np.concatenate([rest, _cut(straight, on_body[is_wall])])
+    return SurfaceReport(tuple(found), tuple(_polylines(rest)), prior > 0.0)
 
 
 def lengths(rows: Structured) -> Floats:
@@ -176,6 +188,17 @@ def refuted(
         if math.log(max(odds, PROBABILITY_MIN)) - straight < STRAIGHT_NAT:
             gone.add(one.number)
     return frozenset(gone)
+
+
+def _cut(rows: Structured, of: NDArray[np.bool_]) -> Structured:
+    """Return the parts of pieces from the first to the last of some of their places, shape (n, PLACES)."""
+    is_some = of.any(axis=1)
+    cut, of = rows[is_some].copy(), of[is_some]
+    begin, end = of.argmax(axis=1) / PLACES, 1.0 - of[:, ::-1].argmax(axis=1) / PLACES
+    for name in "xy":
+        first, way = cut[f"{name}1"].copy(), cut[f"{name}2"] - cut[f"{name}1"]
+        cut[f"{name}1"], cut[f"{name}2"] = first + begin * way, first + end * way
+    return cut
 
 
 def _runs(free: NDArray[np.bool_]) -> Runs:

@@ -18,6 +18,7 @@ from perception.mapping.surfaces.parameters import (
     STRENGTH_MIN,
     SURFACE_CELLS_MAX,
     TAKEN_M,
+    WEAK_MIN,
 )
 from perception.mapping.surfaces.records import (
     ANGLES,
@@ -82,11 +83,11 @@ def capture(room: LocalMap, counts: CellCounts, begin: int, most: int) -> int:
         if counts.block_hits[i // BLOCK, j // BLOCK] == 0 or not RIM <= i < CELLS - RIM:
             continue
         for column in range(max(j, RIM), min(j + BLOCK, CELLS - RIM)):
-            if greatest_strength(counts, i, column) <= STRENGTH_MIN or room.cell_count >= SURFACE_CELLS_MAX:
+            if greatest_strength(counts, i, column) <= WEAK_MIN or room.cell_count >= SURFACE_CELLS_MAX:
                 continue
             computed += 1
             strength = strength_of(counts, i, column)
-            if strength > STRENGTH_MIN:
+            if strength > WEAK_MIN:
                 cell = room.cells[room.cell_count]
                 cell.i, cell.j, cell.strength, cell.owner = i, column, strength, FREE
                 room.cell_count += 1
@@ -181,7 +182,7 @@ def walk(
                     continue
                 i, j = int(x), int(y)
                 n = counts.index[i, j] - 1
-                if n < 0:
+                if n < 0 or cells[n].strength <= STRENGTH_MIN:
                     continue
                 dx, dy = offset_of(i) - line.x, offset_of(j) - line.y
                 if abs(dy * ux - dx * uy) > OFF_LINE_M:
@@ -244,8 +245,9 @@ def best_direction(cells: Records[SurfaceCell], counts: CellCounts, seed: int) -
     count = 0
     for i in range(max(0, i0 - SEED_CELLS), min(CELLS, i0 + SEED_CELLS + 1)):
         for j in range(max(0, j0 - SEED_CELLS), min(CELLS, j0 + SEED_CELLS + 1)):
-            if counts.index[i, j] != 0:
-                counts.near[count] = counts.index[i, j] - 1
+            n = counts.index[i, j] - 1
+            if n >= 0 and cells[n].strength > STRENGTH_MIN:
+                counts.near[count] = n
                 count += 1
     scores = counts.scores
     scores[:] = 0.0
@@ -335,7 +337,7 @@ def grow_all(room: LocalMap, counts: CellCounts, most: int) -> bool:
             return False
         seed = counts.order[room.at]
         room.at += 1
-        if room.cells[seed].owner == FREE:
+        if room.cells[seed].owner == FREE and room.cells[seed].strength > STRENGTH_MIN:
             counts.steps += DIRECTION_STEPS
             grow(room, counts, seed)
     return True

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -19,14 +18,12 @@ from config.robot import RingConfig
 from config.settings import SurfacesConfig
 from drivers.messages import Firing
 from perception.bayes.inference.kernel_settings import circle_models
-from perception.bayes.memory.elements import round_label
-from perception.bayes.memory.parameters import RIVAL_RADII_M
 from perception.bounds import CONSTANT, bounds
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 from perception.map_moves import MapMoves
 from perception.mapping.no_surfaces import NoSurfaces, SurfaceReport
-from perception.mapping.surfaces.beside_known import beside_known, nearness, refuted, wall_prior
+from perception.mapping.surfaces.beside_known import RIVALS_M, beside_known, nearness, refuted, wall_prior
 from perception.mapping.surfaces.local_map import LocalMapSearch
 from perception.mapping.surfaces.parameters import CELL_M, CELLS, PIECE_KEPT_M
 from perception.mapping.surfaces.surface_list import Surface, SurfaceList
@@ -34,8 +31,6 @@ from perception.records import Structured, zeros
 from perception.sensor_mounts import mounts_array, mounts_at
 
 HALF_ANGLE_MAX: Final = math.radians(45.0)
-RIVALS_M: Final = MappingProxyType({round_label(radius): radius for radius in RIVAL_RADII_M if radius > 0.0})
-"""Radii of the round bodies that are no models, by their labels, m."""
 
 
 class SurfaceMap(NoSurfaces):

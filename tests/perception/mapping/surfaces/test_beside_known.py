@@ -67,6 +67,21 @@ def test_where_little_is_known_pieces_stand_for_the_walls() -> None:
     assert not ((beside[:, [1, 3]].min(axis=1) < 3.0) & (beside[:, [1, 3]].max(axis=1) > 3.0)).any()
 
 
+def test_where_little_is_known_a_post_hides_no_outline() -> None:
+    """It is a guess, and no result names it; a drum is one. What is on it of a wall's piece is outline, too."""
+    rows = np.concatenate([room(), pieces((4.0, 3.0, 4.05, 3.0))])
+    rows["number"][-1] = 9
+    for name, there in (("post", True), ("drum", False)):
+        bodies = tuple(DetectedObject(name, x, y, 0.0, 0.01, 9, 1.0) for x, y in ((4.0, 3.1), (8.0, 3.0)))
+        found = report(rows, bodies, {name: 0.2})
+        outlines = [line.points for line in found.polylines]
+        assert [(points[:, 1] == 3.0).all() for points in outlines] == ([True, False] if there else [])
+        if there:
+            assert (outlines[1][:, 0] == 8.0).all()
+            assert np.abs(outlines[1][:, 1] - 3.0).max() < 0.5
+        assert not any(w.ends is not None and w.ends[0] == w.ends[2] == 8.0 and w.y == 3.0 for w in found.walls)
+
+
 @pytest.mark.parametrize("known", range(5))
 def test_the_method_s_walls_are_shown_once_it_knows_most(known: int) -> None:
     """Four walls are known one after the other: from some share on the method's own are shown, and nothing beside."""

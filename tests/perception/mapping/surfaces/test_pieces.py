@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perception.kernel import Floats
-from perception.mapping.surfaces.parameters import CELL_M, CELLS, DIRECTIONS, OFF_LINE_M, WHOLE
+from perception.mapping.surfaces.parameters import CELL_M, CELLS, DIRECTIONS, OFF_LINE_M, STRENGTH_MIN, WHOLE
 from perception.mapping.surfaces.pieces import (
     ROW_PARTS,
     SEED_CELLS,
@@ -108,6 +108,25 @@ def test_a_search_in_parts_finds_the_same() -> None:
     np.testing.assert_array_equal(
         np.sort(local["pieces"]["low"][0, : int(local["piece_count"][0])]), np.sort(grown(points)["low"])
     )
+
+
+@pytest.mark.parametrize(("strength", "count"), [(STRENGTH_MIN + 0.1, 1), (STRENGTH_MIN - 0.1, 0)])
+def test_weak_cells_start_no_piece_and_extend_none(strength: float, count: int) -> None:
+    """They may be points of polylines only; those along a piece are its own."""
+    room, local, counts = mapped(np.concatenate([line(-1.0, 0.0, 0.0, 0.0), line(0.05, 0.0, 1.0, 0.0)]))
+    cells = local["cells"][0, : int(local["cell_count"][0])]
+    along = (cells["i"] + 0.5 - 0.5 * CELLS) * CELL_M
+    cells["strength"][along > 0.0] = strength
+    order_cells(room, records(CellCounts, counts))
+    assert grow_all(room[0], records(CellCounts, counts)[0], 10**9)
+    piece = local["pieces"][0, 0]
+    assert local["piece_count"][0] == 1
+    assert (cells["owner"][along < 0.0] == 0).all()
+    assert (cells["owner"][along > 0.1] == (0 if count else FREE)).all()
+    assert piece["high"] - piece["low"] < 1.1  # it ends at strong cells
+    cells["strength"], cells["owner"], local["piece_count"], local["at"] = strength, FREE, 0, 0
+    assert grow_all(room[0], records(CellCounts, counts)[0], 10**9)
+    assert local["piece_count"][0] <= count
 
 
 def test_a_few_cells_are_no_piece() -> None:

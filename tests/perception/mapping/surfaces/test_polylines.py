@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from perception.mapping.surfaces.parameters import CELL_M, CELLS, LINK_M, NODE_M, PIECE_MIN_M
+from perception.mapping.surfaces.parameters import CELL_M, CELLS, LINK_M, NODE_M, PIECE_MIN_M, STRENGTH_MIN, WEAK_MIN
 from perception.mapping.surfaces.polylines import chain_all, choose_nodes, is_unclaimed
 from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCounts
 from perception.records import records
@@ -50,6 +50,16 @@ def test_a_point_needs_echoes_that_agree() -> None:
     assert chains(np.array([[0.0, 0.0], *stray]), echoes=0.7) == []
     assert len(chains(np.array([[0.0, 0.0], [0.1, 0.05], *stray]), echoes=0.7)) == 1
     assert chains(np.array([[0.0, 0.0], [0.2, 0.0], *stray]), echoes=0.7) == []
+
+
+def test_weak_cells_are_points_where_more_agree() -> None:
+    """Each of these has .8 of an echo in all, spread over six directions: four of them agree, two do not."""
+    square = np.array([[0.0, 0.0], [0.0, 0.1], [0.1, 0.0], [0.1, 0.1]])
+    _, local, _ = mapped(square, 0.36)
+    strengths = local["cells"]["strength"][0, :4]
+    assert ((strengths > WEAK_MIN) & (strengths < STRENGTH_MIN)).all()
+    assert sum(map(len, chains(square, 0.36))) > 0
+    assert chains(square[:2], 0.36) == []
 
 
 def test_cells_of_a_piece_that_does_not_reach_them_are_left() -> None:
