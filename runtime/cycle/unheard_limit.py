@@ -19,8 +19,8 @@ CREEP_M_S: Final = 0.04
 LOST_AHEAD_M: Final = 0.4
 """A ring that hears nothing nearer than this to the clearance before what it heard must have failed, m."""
 LOST: Final = (
-    "the ring hears nothing new any more, not even what it heard a moment ago: the robot drives slowly until it "
-    "hears something; check the ring's power and cables"
+    "the ring hears nothing new, not even what it heard a moment ago: the robot drives slowly until it does; beside "
+    "smooth walls that is so for moments, but if it lasts, check the ring's power and cables"
 )
 UNHEARD: Final = (
     "the ring no longer hears what stood in the way, although the robot has come nearer: the robot drives slowly "
