@@ -64,8 +64,8 @@ LIMITS: Sequence[str] = (
     "otherwise, and a ring that is turned by a half among few surfaces, as in a corridor: 6 of 16 drives of rings of "
     "8, 16 and 24 sensors then touched something, 1 of 16 turned by a quarter, and 0 of 16 by 45°.",
     "Any lie while the robot stands, or among surfaces whose ranges its motion does not change: nothing differs "
-    "then; after half a metre of repeated echoes, or twice the longest such way so far, the robot creeps, and after "
-    "4 m of silence. Where nothing echoes, silence is true and false alike.",
+    "then; after half a metre or half a turn of repeated echoes, or twice the longest such silence so far, the robot "
+    "creeps, and after 4 m of silence. Where nothing echoes, silence is true and false alike.",
     "An object that appears nearer than the way that the robot drives until the ring next looks there, and then "
     "brakes: at .3 m/s an object set .1 m ahead of the rim is hit by every robot that drives straight at it, "
     "since it is there after .33 s.",

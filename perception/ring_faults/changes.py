@@ -9,6 +9,8 @@ change that all sensors have in common:
 
 All use the density of an honest reading around what is expected, so what no change explains better counts for none. A
 change that agrees with the motion from then on can be found only in this one round.
+
+Silences that come together need not be a fault: `mirror_left` weighs whether one turn explains them.
 """
 
 from __future__ import annotations
@@ -282,3 +284,45 @@ def weigh_changes(
         if nats > most:
             found, most = EXCHANGED, nats
     return found, most / max(1.0, len(echoes) * half_angle / math.pi)
+
+
+@kernel
+def turned_past(c: EchoTrace, half_angle: float) -> tuple[float, float]:
+    """Return the directions, their middle and width in rad, that a sensor's beam has left since its last echo."""
+    turned = c.latest.axis - c.heard.axis
+    width = min(abs(turned), 2.0 * half_angle)
+    return c.heard.axis - math.copysign(half_angle - 0.5 * width, turned), width
+
+
+@kernel
+def mirror_left(i: int, mirrors: float, missed: float, half_angle: float, echoes: Records[EchoTrace]) -> float:
+    """Return how likely it is that the mirror which sensor `i` heard last has left its beam as the robot turned.
+
+    A mirror is heard while its normal lies in the beam. Walls that face each other are parallel: all sensors that
+    lose their normal in the same turn fall silent together, which is one event and not many. Each other sensor that
+    has just fallen silent in a turn past the same directions makes it more likely.
+
+    Parameters
+    ----------
+    i : int
+        The sensor; its newest look has been entered.
+    mirrors : float
+        Share of what the ring hears that are mirrors.
+    missed : float
+        Share of looks that an honest ring misses for other reasons.
+    half_angle, echoes
+        As for `motion_tests.check_motion`.
+    """
+    middle, width = turned_past(echoes[i], half_angle)
+    likely = min(mirrors * width / (2.0 * half_angle), 0.5)
+    if likely <= 0.0:
+        return 0.0
+    odds = likely / (1.0 - likely)
+    for k in range(len(echoes)):
+        other = echoes[k]
+        if k != i and other.agreed > 0 and 1 <= other.silences <= 2:
+            its_middle, its_width = turned_past(other, half_angle)
+            off = abs(wrapped(2.0 * (its_middle - middle))) / 2.0
+            common = min(max(0.5 * (width + its_width) - off, 0.0), min(width, its_width)) / width
+            odds *= 1.0 - common + common / missed
+    return odds / (1.0 + odds)

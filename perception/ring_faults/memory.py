@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Final, TypeAlias
 
 from perception.bounds import FINITE, PLACE, POSITIVE, Count, Flag, Place
-from perception.kernel import Floats
+from perception.kernel import Floats, kernel
 from perception.records import Record
 
 NO_ECHO_M: Final = -1.0
@@ -108,3 +108,9 @@ class RingTrace(Record):
     """Looks of each kind that missed a known echo."""
     looks: Annotated[Floats, LOOK_KINDS, POSITIVE]
     """All looks of each kind."""
+
+
+@kernel
+def mark(place: SensorPlace, r: float, x: float, y: float, axis: float, path_m: float) -> None:
+    """Enter a reading and where the sensor made it."""
+    place.range_m, place.x, place.y, place.axis, place.path_m = r, x, y, axis, path_m

@@ -19,6 +19,7 @@ from perception.ring_faults.changes import (
     NOISE_M,
     TURNING_SHARE,
     Expected,
+    mirror_left,
     weigh_changes,
 )
 from perception.ring_faults.memory import (
@@ -30,12 +31,12 @@ from perception.ring_faults.memory import (
     Look,
     Reception,
     RingTrace,
+    mark,
 )
 from perception.ring_faults.repeats import (
     STEP_MIN_M,
     is_parallel_wall,
     learn_noise,
-    mark,
     repeat_evidence,
     weigh_repeat,
 )
@@ -67,6 +68,10 @@ HONEST_MISS_MIN: Final = 0.04
 """An honest ring misses no less of its known echoes than this share: all surfaces end."""
 HONEST_MISS_MAX: Final = 0.6
 """An honest ring misses no more of its known echoes than this share: some are heard."""
+MIRRORS_MISSED: Final = 0.4
+"""Share of mirrors for each look that a sensor which turns misses more often. With .4 rings of 8 to 32 sensors that
+fall silent among rough walls are named within 8 s in 89 of 160 drives, in 91 if mirrors leave one by one; with 2, in
+75. An honest ring that turns between two mirrors keeps within 10 nat."""
 STEADY, TURNING, AGAIN, DOUBTED = range(LOOK_KINDS)
 """Kinds of looks: at an echo that agreed with the one before, from the same direction or another; the second look at
 one that was missed; and at one that agreed with nothing. After that, silence is as honest: it was a stray."""
@@ -102,24 +107,35 @@ def honest_share(all_of: RingTrace, kind: int) -> float:
 
 
 @kernel
-def weigh_look(c: EchoTrace, look: Look, is_ahead: bool, reception: Reception, all_of: RingTrace) -> None:
+def weigh_look(
+    i: int,
+    look: Look,
+    is_ahead: bool,
+    reception: Reception,
+    echoes: Records[EchoTrace],
+    all_of: RingTrace,
+) -> None:
     """Test whether a reading is where the sensor's last echo leads to expect it.
 
-    How often an honest ring misses an echo is learned on the way, for each kind of look.
+    How often an honest ring misses an echo is learned on the way, for each kind of look; a mirror may besides have
+    left the beam.
 
     Parameters
     ----------
-    c : record
-        What is remembered of the sensor. Updated.
+    i : int
+        The sensor.
     look : Look
         Its reading, place and direction.
     is_ahead : bool
         Whether it looks in the direction of travel.
     reception : Reception
         What the ring hears.
+    echoes : (n,) records
+        What is remembered of each sensor. Updated for this one.
     all_of : record
         What is remembered of the ring. Updated.
     """
+    c = echoes[i]
     r, x, y, axis = look
     half_angle, tolerance, reach = reception
     heard = c.heard.range_m
@@ -134,6 +150,11 @@ def weigh_look(c: EchoTrace, look: Look, is_ahead: bool, reception: Reception, a
         honest = honest_share(all_of, kind)
         if kind == TURNING:
             honest = min(max(honest, 0.25 * turned / half_angle), HONEST_MISS_MAX)
+        if is_known:
+            steady = honest_share(all_of, STEADY)
+            mirrors = MIRRORS_MISSED * max(0.0, honest_share(all_of, TURNING) - steady)
+            left = mirror_left(i, mirrors, steady, half_angle, echoes)
+            honest = min(max(honest, left), MISSED)
         evidence = math.log((1.0 - MISSED) / (1.0 - honest)) if agrees else math.log(MISSED / honest)
         add_evidence(all_of, evidence, is_ahead)
         if all_of.missed_nat[0] == 0.0:
@@ -340,7 +361,7 @@ def check_motion(
         heard_before = echoes[i].before.range_m if echoes[i].is_compared else NO_ECHO_M
         nats = weigh_replay(i, look, heard_before, reception, past)
         replayed = max(replayed, nats)
-        weigh_look(echoes[i], look, is_ahead, reception, all_of)
+        weigh_look(i, look, is_ahead, reception, echoes, all_of)
         if r >= 0.0:
             weigh_change(i, look, yaw, mounts, reception, echoes, all_of)
     found = REPEATED if replayed >= REPLAY_NAT else conclusion(all_of)

@@ -8,7 +8,8 @@ from typing import Final
 from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.records import Records
-from perception.ring_faults.memory import EchoTrace, Look, Reception, RingTrace, SensorPlace
+from perception.ring_faults.changes import TURNING_SHARE
+from perception.ring_faults.memory import EchoTrace, Look, Reception, RingTrace, SensorPlace, mark
 from perception.sensor_faults.monitor import TOLERANCE_MIN_M
 from perception.sensor_faults.wall import NOISE_SHARE, towards_wall
 
@@ -36,12 +37,6 @@ WINDING_NAT: Final = math.log(1.0 / 0.05)
 """Evidence of a reading that is equal to the bit although the robot winds, nat. Of 9,321 such looks in 36 honest
 drives of a minute, with noise and without, among mirrors and rough walls, 24 were equal, at most two in succession:
 the course of a robot that winds through a corridor is along its walls for a moment."""
-
-
-@kernel
-def mark(place: SensorPlace, r: float, x: float, y: float, axis: float, path_m: float) -> None:
-    """Enter a reading and where the sensor made it."""
-    place.range_m, place.x, place.y, place.axis, place.path_m = r, x, y, axis, path_m
 
 
 @kernel
@@ -217,6 +212,20 @@ def learn_noise(c: EchoTrace, r: float, x: float, y: float, axis: float, toleran
 
 
 @kernel
+def noise_evidence(c: EchoTrace, reception: Reception) -> float:
+    """Return the evidence of a reading that equals the one before, if the ranges have noise, nat; `c` has both.
+
+    Noise is new where the sensor has moved by `STEP_MIN_M`, or turned so far that it looks elsewhere, to and fro as
+    well; the evidence of a shorter motion is a share of that. A turn between two looks gives one new reading at most.
+    """
+    half_angle, tolerance, _ = reception
+    now, then = c.latest, c.before
+    moved = math.hypot(now.x - then.x, now.y - then.y) / max(STEP_MIN_M, 3.0 * tolerance)
+    turned = min(abs(now.axis - then.axis) / (TURNING_SHARE * half_angle), 1.0)
+    return (moved + turned) * math.log(1.0 + CHATTER_SHARE * now.range_m / tolerance)
+
+
+@kernel
 def winds(c: EchoTrace, tolerance: float) -> bool:
     """Return whether the robot turned and drove between the last two looks of a sensor, so that no range stays equal.
 
@@ -290,16 +299,18 @@ def weigh_own_repeat(
     mounts: Floats,
     reception: Reception,
     echoes: Records[EchoTrace],
-    path_m: float,
+    all_of: RingTrace,
 ) -> None:
     """Update the evidence that a sensor repeats its own reading, whatever the others hear: `own`, `stuck_nat`.
 
     Parameters
     ----------
-    i, look, yaw, mounts, reception, echoes, path_m
+    i, look, yaw, mounts, reception, echoes
         As for `changes_due`.
+    all_of : record
+        What is remembered of the ring.
     """
-    c = echoes[i]
+    c, path_m = echoes[i], all_of.path_m
     r, x, y, axis = look
     if not c.is_known or r < 0.0 or not repeats(r, c.own.range_m):
         mark(c.own, r, x, y, axis, path_m)
@@ -308,11 +319,16 @@ def weigh_own_repeat(
     way = (x - c.own.x, y - c.own.y)
     is_turned = abs(axis - c.own.axis) > 2.0 * reception[0]
     has_moved = path_m - c.own.path_m > reception[1]  # on the spot there is no path that a wall may go along
-    if has_moved and not is_turned and may_be_wall(i, r, way, yaw, mounts, reception, echoes, path_m):
+    is_wall = has_moved and not is_turned and may_be_wall(i, r, way, yaw, mounts, reception, echoes, path_m)
+    if is_wall:
         mark(c.own, c.own.range_m, x, y, axis, path_m)
     due = REPEAT_NAT * changes_due(i, look, c.own, yaw, mounts, reception, echoes, path_m)
-    is_equal = r == c.own.range_m and winds(c, reception[1])
-    c.stuck_nat = max(due, c.stuck_nat + (WINDING_NAT if is_equal else 0.0))
+    more = 0.0
+    if r == c.own.range_m and winds(c, reception[1]):
+        more = WINDING_NAT
+    elif r == c.own.range_m and not is_wall and all_of.noise_nat >= SENSOR_NAT:
+        more = noise_evidence(c, reception)
+    c.stuck_nat = max(due, c.stuck_nat + more)
 
 
 @kernel
@@ -354,7 +370,7 @@ def weigh_repeat(
     c, all_of = echoes[i], ring[0]
     r, x, y, axis = look
     tolerance = reception[1]
-    weigh_own_repeat(i, look, yaw, mounts, reception, echoes, all_of.path_m)
+    weigh_own_repeat(i, look, yaw, mounts, reception, echoes, all_of)
     is_repeating = c.standstill == all_of.standstill
     if not c.is_known or not repeats(r, c.repeated.range_m if is_repeating else c.before.range_m):
         if c.is_known and is_ahead:
@@ -376,7 +392,6 @@ def weigh_repeat(
         if due > c.repeated_nat:
             all_of.repeated_nat += due - c.repeated_nat
             c.repeated_nat = due
-        steps = math.floor(math.hypot(x - c.repeated.x, y - c.repeated.y) / max(STEP_MIN_M, 3.0 * tolerance))
-        equal = min(steps * math.log(1.0 + CHATTER_SHARE * r / tolerance), SENSOR_NAT - c.repeated_nat)
+        equal = min(c.equal_nat + noise_evidence(c, reception), SENSOR_NAT - c.repeated_nat)
         all_of.equal_nat = max(0.0, all_of.equal_nat + equal - c.equal_nat)
         c.equal_nat = equal

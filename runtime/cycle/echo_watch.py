@@ -6,10 +6,10 @@ again it drives on. If its ring reaches far, so that it would hear any room, it 
 (`runtime.cycle.unheard_limit`).
 
 Later the ring may fail, or freeze: then it hears nothing new. A line of the log says so once that has lasted for
-longer than ever before in this run. If old echoes were repeated on the way, the robot drives slowly from there on
-until the next new echo: no honest ring does that for long. What a silent ring heard last holds for as far as it
-reached then, and few sensors often hear nothing for half a metre: after such a way it drives slowly, too. It does not
-stop.
+longer than ever before in this run; a turn counts as well as a way, as it looks at something else. If old echoes were
+repeated most of that way, the robot drives slowly from there on until the next new echo: no honest ring does that for
+long. What a silent ring heard last holds for as far as it reached then, and few sensors often hear nothing for half a
+metre: after such a way it drives slowly, too. It does not stop.
 """
 
 from __future__ import annotations
@@ -28,6 +28,11 @@ LONGER: Final = 2.0
 LINE_MIN_M: Final = 0.5
 """A way without anything new is worth a line if it is so many times as long as any before, and this long, m: an
 honest run gives at most four, as each doubles what the next one needs."""
+TURN_M: Final = LINE_MIN_M / math.pi
+"""Way that a turn by a radian counts as for such a line: half a turn looks at what lies on the other side."""
+REPEATED_SHARE: Final = 0.5
+"""Old echoes are repeated if the last one came after this share of a silence or later: a frozen ring repeats them to
+the end, an honest one hears one again and is silent then."""
 OPEN_M: Final = 4.0
 """Way and reach together at which a ring that hears nothing stops the robot, m: from the middle of a room 8 m wide it
 has come within reach of a wall by then. In the shipped room a reach of 1.7 m hears its first echo after 1.3 m. After
@@ -53,12 +58,14 @@ class EchoWatch:
     """An echo was heard, or the robot was stopped for want of one."""
     way_m: Coordinate = 0.0
     """Driven since the start or since the ring heard anything new, at most `OPEN_M`, m."""
+    turned_m: Coordinate = 0.0
+    """Way that its turns in this silence count as, at most `OPEN_M`, m."""
     longest_m: Coordinate = 0.0
-    """The longest such way that an echo has ended, m."""
+    """The longest such silence that an echo has ended, way and turns, m."""
     is_open: bool = False
     """The operator has armed the robot although the ring hears nothing: it is in the open until the next echo."""
-    repeats: bool = False
-    """Old echoes were repeated in this silence."""
+    repeated_m: Coordinate = -1.0
+    """Way and turns in this silence until an old echo was repeated last, m; below zero if none was."""
     at: Pose | None = None
     """Where the robot was by its newest odometry in this silence."""
 
@@ -76,18 +83,22 @@ class EchoWatch:
         if hears and hears_new:
             if self.is_over and self.at is None and not self.is_open:
                 return self
-            return EchoWatch(is_over=True, longest_m=max(self.longest_m, self.way_m if self.is_over else 0.0))
+            return EchoWatch(is_over=True, longest_m=max(self.longest_m, self.searched_m if self.is_over else 0.0))
         if odometry is None or not firings:
             return self
         pose = odometry.pose
-        way = 0.0 if self.at is None else math.dist((pose.x, pose.y), (self.at.x, self.at.y))
-        return replace(
-            self,
-            is_over=self.is_over or hears,
-            way_m=min(self.way_m + way, OPEN_M),
-            repeats=self.repeats or hears,
-            at=pose,
+        at = pose if self.at is None else self.at
+        way_m = self.way_m + math.dist((pose.x, pose.y), (at.x, at.y))
+        turned_m = self.turned_m + TURN_M * abs(math.remainder(pose.theta - at.theta, math.tau))
+        watch = replace(
+            self, is_over=self.is_over or hears, way_m=min(way_m, OPEN_M), turned_m=min(turned_m, OPEN_M), at=pose
         )
+        return replace(watch, repeated_m=watch.searched_m) if hears else watch
+
+    @property
+    def searched_m(self) -> float:
+        """Way and turns in this silence, m."""
+        return self.way_m + self.turned_m
 
     def armed(self) -> EchoWatch:
         """Return the watch after the robot was armed, by an operator who has seen where it stands."""
@@ -100,18 +111,26 @@ class EchoWatch:
         """
         if not self.is_over:
             return NOTHING_YET if reach_m >= OPEN_M - WAY_MIN_M else None
-        return self.silence if self.repeats or self.way_m >= OPEN_M else None
+        return self.silence if self._repeats or self.way_m >= OPEN_M else None
+
+    @property
+    def _repeats(self) -> bool:
+        """Whether old echoes were repeated in most of this silence."""
+        return self.repeated_m >= REPEATED_SHARE * self.searched_m
 
     @property
     def silence(self) -> str | None:
         """What to check where the ring has long heard nothing new, after its first echo or that stop; or None."""
-        least_m = max(LINE_MIN_M, LONGER * self.longest_m)
-        if not self.is_over or self.is_open or self.way_m < min(least_m, OPEN_M):
+        least_m = min(max(LINE_MIN_M, LONGER * self.longest_m), OPEN_M)
+        if not self.is_over or self.is_open or self.searched_m < least_m:
             return None
         if self.way_m >= OPEN_M:
             return NOTHING_NEW
-        over = f"over the last {least_m:.1f} m, in this run never before for so long"
-        if self.repeats:
+        over = (
+            f"over the last {least_m:.1f} m, in this run never before for so long (half a turn counts as "
+            f"{LINE_MIN_M:g} m)"
+        )
+        if self._repeats:
             return f"all echoes are old ones, repeated {over}: {_SLOWLY}"
         return (
             f"no sensor has heard anything new {over}: if anything stands within range, halt the robot and check the "

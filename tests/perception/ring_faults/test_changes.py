@@ -20,8 +20,7 @@ from perception.ring_faults.changes import (
     source,
     weigh_changes,
 )  # fmt: skip
-from perception.ring_faults.memory import NO_ECHO_M, EchoTrace
-from perception.ring_faults.repeats import mark
+from perception.ring_faults.memory import NO_ECHO_M, EchoTrace, mark
 
 COUNT = 16
 AXES = np.arange(COUNT) * math.tau / COUNT

@@ -33,11 +33,12 @@ STEP_M = 0.02
 class Ring:
     """A ring whose readings a test chooses."""
 
-    def __init__(self) -> None:
-        self.echoes, self.memory = zeros(EchoTrace, COUNT), zeros(RingTrace, 1)
-        self.expected = zeros(Expected, COUNT)
-        self.past = np.zeros((COUNT, PAST_LOOKS, PAST_FIELDS))
-        self.looks, self.replayed_nat = np.zeros(COUNT, np.int64), np.zeros(PAST_LOOKS)
+    def __init__(self, mounts: Floats = MOUNTS) -> None:
+        self.mounts, count = mounts, len(mounts)
+        self.echoes, self.memory = zeros(EchoTrace, count), zeros(RingTrace, 1)
+        self.expected = zeros(Expected, count)
+        self.past = np.zeros((count, PAST_LOOKS, PAST_FIELDS))
+        self.looks, self.replayed_nat = np.zeros(count, np.int64), np.zeros(PAST_LOOKS)
         self.x = self.yaw = 0.0
         self.step_m = STEP_M
 
@@ -45,7 +46,7 @@ class Ring:
         found = check_motion(
             ranges,
             (self.x, 0.0, self.yaw),
-            MOUNTS,
+            self.mounts,
             (HALF, TOLERANCE, REACH),
             records(EchoTrace, self.echoes),
             records(RingTrace, self.memory),
@@ -125,6 +126,54 @@ def test_a_few_misses_are_honest_and_a_finding_begins_anew() -> None:
     assert ring.missed_nat == 0.0
     assert ring.fire(np.full(COUNT, math.inf)) == VANISHED
     assert ring.missed_nat == 0.0
+
+
+def mirrored(ring: Ring) -> Floats:
+    """Return what a ring hears in a square room of mirrors: those whose normal is in the beam."""
+    axes = ring.mounts[:, 2] + ring.yaw
+    off = np.abs(np.remainder(axes + 0.25 * math.pi, 0.5 * math.pi) - 0.25 * math.pi)
+    return np.where(off < HALF, 2.0 + 0.5 * np.round(axes / (0.5 * math.pi)) % 2, math.inf)
+
+
+def test_mirrors_that_leave_all_beams_in_one_turn_are_one_event_and_not_many() -> None:
+    """Four arrays of eight sensors, as on robots with arrays above each other, turn to and fro among mirrors."""
+    ring = Ring(np.tile(MOUNTS[::3], (4, 1)))
+    ring.step_m, most = 0.0, 0.0
+    for k in range(120):
+        ring.yaw = math.radians(0.5 * abs((k + 20) % 80 - 40))
+        assert ring.fire(mirrored(ring)) == NOTHING
+        most = max(most, ring.missed_nat)
+    assert 0.0 < most < 0.6 * EVIDENCE_NAT
+
+
+def test_a_ring_that_falls_silent_in_a_turn_is_named_nevertheless() -> None:
+    """Mirrors do not leave the beams of all directions at once."""
+    ring = after(0.5)
+    for ring.yaw in np.radians(np.arange(0.0, 14.0, 2.0)):
+        assert ring.fire(honest(ring.x)) == NOTHING
+    assert VANISHED in [ring.fire(np.full(COUNT, math.inf)) for ring.yaw in np.radians([14.0, 16.0])]
+
+
+def turned_to_and_fro(noise_m: float, frozen: bool) -> int:
+    """Return what is found of three sensors ahead while the robot stands and then turns by 70° to either side."""
+    ring, rng = (
+        Ring(np.array([[0.0, 0.0, math.radians(angle)] for angle in (25.0, 0.0, -25.0)])),
+        np.random.default_rng(4),
+    )
+    ring.step_m, found, ranges = 0.0, NOTHING, np.array([math.inf, math.inf, 1.44])
+    for k in range(150):
+        if k < 30 or not frozen:
+            ranges = np.array([math.inf, math.inf, 1.44 + rng.normal(0.0, noise_m)])
+        found = found or ring.fire(ranges)
+        ring.yaw = math.radians(70.0 * math.sin(0.2 * max(0, k - 30)))
+    return found
+
+
+def test_a_frozen_echo_is_named_while_the_robot_turns_to_and_fro() -> None:
+    """Of three sensors one has heard an echo. To and fro no other surface comes into view; noise comes anew."""
+    assert turned_to_and_fro(0.014, frozen=True) == STUCK_SENSOR + 2
+    assert turned_to_and_fro(0.014, frozen=False) == NOTHING
+    assert turned_to_and_fro(0.0, frozen=True) == NOTHING, "a ring without noise may stand amid a round wall"
 
 
 def test_the_only_sensor_that_hears_is_named_where_it_does_not_change() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perception.records import Records, records, zeros
-from perception.ring_faults.memory import NO_ECHO_M, EchoTrace, RingTrace
+from perception.ring_faults.memory import NO_ECHO_M, EchoTrace, RingTrace, mark
 from perception.ring_faults.motion_tests import EVIDENCE_NAT
 from perception.ring_faults.repeats import (
     EQUAL_NAT,
@@ -22,7 +22,6 @@ from perception.ring_faults.repeats import (
     changes_due,
     is_parallel_wall,
     learn_noise,
-    mark,
     repeat_evidence,
     repeats,
     weigh_repeat,

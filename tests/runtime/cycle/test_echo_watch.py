@@ -20,8 +20,8 @@ from tests.runtime.emulated_run import Run
 TOUCH_M_S = 0.05
 
 
-def at(x_m: float) -> Odometry:
-    return Odometry(x_m, Pose(x_m, 0.0, 0.0), 0.0, Twist(0.3, 0.0), Flags.NONE, 0)
+def at(x_m: float, theta: float = 0.0) -> Odometry:
+    return Odometry(x_m, Pose(x_m, 0.0, theta), theta, Twist(0.3, 0.0), Flags.NONE, 0)
 
 
 def heard(*ranges_m: float) -> tuple[Firing, ...]:
@@ -82,6 +82,32 @@ def test_only_a_silence_that_is_longer_than_all_before_is_a_line() -> None:
         assert watch.silence is None
     assert len(lines) == 2
     assert all(any(f"over the last {way} m, in this run" in line for line in lines) for way in ("0.6", "3.0"))
+
+
+@pytest.mark.parametrize("repeated_m", [math.inf, 2.0])
+def test_a_robot_that_turns_to_and_fro_without_a_new_echo_gives_a_line(repeated_m: float) -> None:
+    watch = EchoWatch().observe(at(0.0), heard(2.0))
+    for k in range(1, 32):
+        turn = 0.1 * abs((k + 10) % 20 - 10)
+        watch = watch.observe(at(0.0, math.pi - 1.0 + turn), heard(repeated_m), hears_new=False)
+    assert watch.silence is None
+    for theta in (0.0, 0.5):
+        watch = watch.observe(at(0.0, theta), heard(repeated_m), hears_new=False)
+    assert watch.silence is not None
+    assert watch.way_m == 0.0
+    assert (watch.slow_reason(1.7) is None) is math.isinf(repeated_m)
+    assert (
+        EchoWatch().observe(at(0.0), heard(math.inf)).observe(at(0.0, 3.0), heard(math.inf)).stopped(4.0)[1] is None
+    )
+
+
+def test_an_old_echo_at_the_beginning_of_a_silence_does_not_slow_the_robot_down() -> None:
+    watch = EchoWatch().observe(at(0.0), heard(2.0))
+    for k in range(12):
+        watch = watch.observe(at(0.1 * k), heard(2.0 if k < 2 else math.inf), hears_new=False)
+    assert watch.slow_reason(1.7) is None
+    assert watch.silence is not None
+    assert watch.observe(at(1.2), heard(2.0), hears_new=False).slow_reason(1.7) is not None, "it is heard to the end"
 
 
 @pytest.mark.compiled
