@@ -74,7 +74,7 @@ class Maps(NamedTuple):
     usual: Floats
     """Sum of the log likelihoods of known readings where maps fitted, and their number, shape (2,)."""
     grids: dict[int, Floats]
-    """Hits and passes of maps by number, shape (2, SUBMAP_CELLS, SUBMAP_CELLS) each: what was computed is kept."""
+    """Hits and passes of maps by number, shape (2, SUBMAP_CELLS, SUBMAP_CELLS) each, the last used at the end."""
 
 
 class Outcome(NamedTuple):
@@ -144,11 +144,13 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
 
 
 def _grid_of(maps: Maps, number: int, half_angle: float) -> Floats:
-    """Return hits and passes of a map before; made again at once if the process has started since then."""
-    if number not in maps.grids:
+    """Return hits and passes of a map before; made again at once if they are no longer kept."""
+    grid = maps.grids.pop(number, None)
+    if grid is None:
         submap = maps.submaps[number]
-        *_, maps.grids[number] = make_grid(np.ascontiguousarray(submap["readings"][: submap["count"]]), half_angle)
-    return maps.grids[number]
+        *_, grid = make_grid(np.ascontiguousarray(submap["readings"][: submap["count"]]), half_angle)
+    maps.grids[number] = grid
+    return grid
 
 
 def _runs(numbers: Sequence[int]) -> list[list[int]]:

@@ -41,6 +41,7 @@ from perception.localization.submaps.submap_records import (
     pose_of,
     scaled,
     spread_about,
+    spread_beyond,
 )
 from perception.map_moves import MapMoves
 from perception.records import zeros
@@ -66,6 +67,9 @@ REFUTED_A_MAP: Final = 0.55
 """What is fitted to noise gains ½ nat for each number that it determines, about one a map. Drives with exact poses (4
 real ones in 4 roundings, 12 in buildings) gain 0.10 to 0.50 a map, and stay 2.6 nat below or more. Drives with drift
 among mirrors are refuted after 19 % of the way, with 0.6 after 24 %."""
+
+GRIDS_MAX: Final = 250
+"""Maps whose grids are kept, 79 MB in all, or 750 m of way. An older one is made again when the robot is there."""
 
 
 class SubmapGraph:
@@ -190,10 +194,11 @@ class SubmapGraph:
             node = compose(pose_of(self._nodes.archived_rows[-1]), scaled(moved, self._scales))
             covariance = walk(moved, middle[3] - before[-1]["way"], middle[4] - before[-1]["turn"])
             information = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
-            self._links.append(odometry_link(len(before) - 1, moved, information))
+            link = odometry_link(len(before) - 1, moved, information)
+            self._links.append(link)
+            self._spread[:] = spread_beyond(self._spread, link, pose_of(self._nodes.archived_rows[-1]), node)
         self._nodes.append(node_at(node))
         self.held.append(node if self.held.is_moved else middle[:3])
-        self._renew_spread()
         self._begin[:] = self._here[3:]
         self._latest[:] = math.inf
         self._count = self._trail_count = 0
@@ -240,7 +245,9 @@ class SubmapGraph:
         self.is_applied = self.is_applied or outcome.gain > REFUTED + REFUTED_A_MAP * self._matched
         self._matched += 1
         self._quanta, self._job = 0, None
-        self._renew_spread()
+        for number in list(self._grids)[:-GRIDS_MAX]:
+            del self._grids[number]
+        self._spread[:] = spread_about(0, self._links.archived_rows, self._nodes.archived_rows)[-1]
 
     @property
     def count(self) -> int:
@@ -265,9 +272,6 @@ class SubmapGraph:
         if not self.held.is_moved:
             return IDENTITY
         return Pose(*self.moment().odometry.tolist()).compose(Pose(*self.in_filter().tolist()).inverse())
-
-    def _renew_spread(self) -> None:
-        self._spread[:] = spread_about(0, self._links.archived_rows, self._nodes.archived_rows)[-1]
 
     def drop_caches(self) -> None:
         """Forget what follows from the rest, after a snapshot was put back."""

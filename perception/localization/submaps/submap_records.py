@@ -55,15 +55,23 @@ class Rows:
         Their kind.
     """
 
+    SCRATCH: Final = ("_store",)
     BOUNDS: Final = bounds(archived_rows=lambda self: self._record.BOUNDS)
 
     def __init__(self, record: type[Record]) -> None:
         self._record = record
         self.archived_rows: Structured = zeros(record, 0)
+        self._store = self.archived_rows
+        """What `archived_rows` is the begin of, unless it was replaced since, with room for more."""
 
     def append(self, row: Structured) -> None:
         """Add one."""
-        self.archived_rows = np.concatenate([self.archived_rows, row])
+        count, store = len(self.archived_rows), self._store
+        if self.archived_rows.base is not store or count == len(store):
+            store = zeros(self._record, count + count // 4 + 16)
+            store[:count] = self.archived_rows
+        store[count : count + 1] = row
+        self._store, self.archived_rows = store, store[: count + 1]
 
 
 def fresh_sensors(ranges: Floats, here: Floats, latest: Floats) -> NDArray[np.bool_]:
@@ -142,3 +150,12 @@ def spread_about(number: int, links: Structured, nodes: Structured) -> Floats:
     spread[number] = 0.0
     spread_from(records(Link, links), len(links), records(Node, nodes), spread)
     return spread
+
+
+def spread_beyond(spread: Floats, link: Structured, here: Floats, there: Floats) -> Floats:
+    """Return `spread_about`'s variances at the end of a link that leads to nothing else, from those at its begin."""
+    only, both = link.copy(), np.concatenate([node_at(here), node_at(there)])
+    only["of"], only["to"] = 0, 1
+    spreads = np.array([spread, [math.inf, math.inf]])
+    spread_from(records(Link, only), 1, records(Node, both), spreads)
+    return np.asarray(spreads[1])

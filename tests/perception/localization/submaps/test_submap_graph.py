@@ -136,6 +136,16 @@ def test_a_snapshot_in_the_middle_of_a_job_goes_on_to_the_bit() -> None:
     assert all(np.array_equal(mine[name], its[name], equal_nan=mine[name].dtype.kind == "f") for name in mine)
 
 
+def test_grids_that_are_not_kept_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    firings, _ = driven(0.04, 0.02, 1)
+    whole = follow(SubmapGraph(RING), firings)
+    monkeypatch.setattr("perception.localization.submaps.submap_graph.GRIDS_MAX", 2)
+    few = SubmapGraph(RING)
+    assert np.array_equal(follow(few, firings), whole)
+    assert few.count > 4
+    assert len(few._grids) == 2
+
+
 def test_after_a_reset_nothing_is_left() -> None:
     firings, _ = driven(0.04, 0.02, rounds=1)
     graph = SubmapGraph(RING)

@@ -20,6 +20,8 @@ from perception.localization.submaps.submap_records import (
     odometry_link,
     pose_of,
     scaled,
+    spread_about,
+    spread_beyond,
 )
 
 
@@ -72,6 +74,33 @@ def test_a_pose_survives_as_a_record() -> None:
     rows.append(node_at(pose))
     assert rows.archived_rows["y"].tolist() == [2.0]
     assert rows.archived_rows.dtype == Node.DTYPE
+
+
+def test_rows_grow_and_go_on_after_they_are_replaced() -> None:
+    rows = Rows(Node)
+    for k in range(40):
+        rows.append(node_at(np.array([float(k), 0.0, 0.0])))
+    last = rows.archived_rows
+    assert last["x"].tolist() == list(range(40))
+    rows.archived_rows = last[:2].copy()
+    rows.append(node_at(np.array([9.0, 0.0, 0.0])))
+    assert rows.archived_rows["x"].tolist() == [0.0, 1.0, 9.0]
+    assert last["x"].tolist() == list(range(40)), "who replaces the rows may keep the old ones"
+
+
+def test_the_spread_of_a_further_map_is_that_of_the_whole_chain() -> None:
+    places = [np.array([0.3 * k, 0.1 * k * k, 0.2 * k]) for k in range(5)]
+    links = np.concatenate(
+        [
+            odometry_link(k, between(places[k], places[k + 1]), np.diag([90.0 + k, 60.0, 400.0]) + 5.0 * k)
+            for k in range(4)
+        ]
+    )
+    nodes = np.concatenate([node_at(place) for place in places])
+    whole = spread_about(0, links, nodes)
+    for k in range(4):
+        beyond = spread_beyond(whole[k], links[k : k + 1], places[k], places[k + 1])
+        assert beyond.tolist() == whole[k + 1].tolist()
 
 
 def test_a_reading_is_fresh_once_its_sensor_is_elsewhere() -> None:
