@@ -366,6 +366,8 @@ def way_places(
     kilometres
         Length of a way round blocks of corridors, km; only the graph of maps follows it.
     """
+    if rooms <= 0 and corridor <= 0 and kilometres <= 0.0:
+        raise UserError("nothing to measure: give --rooms, --corridor or --kilometres")
     use_kernel_cache()
     from bench.way_places import measure_corridor, measure_long, measure_rooms
 

@@ -78,10 +78,10 @@ def rows_table(title: str, rows: Mapping[str, Mapping[str, float]]) -> Table:
     title : str
         Of the table.
     rows : mapping
-        The figures of each method; those of the first give the columns.
+        The figures of each method.
     """
     table = Table(title=title, title_justify="left")
-    columns = next(iter(rows.values()))
+    columns = dict.fromkeys(column for row in rows.values() for column in row)
     for column in ("method", *columns):
         table.add_column(column, justify="left" if column == "method" else "right")
     for method, row in rows.items():

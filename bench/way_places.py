@@ -35,7 +35,7 @@ from runtime.timing.footprint import own_mb
 DRUMLESS: Final = ("boxes", "clutter")
 SECONDS: Final = 180.0
 """Of a drive: 40 to 50 m, which passes each place of a room about three times."""
-CHI2_95: Final = 3.841
+CHI2_95_ONE: Final = 3.841
 """Of one degree of freedom."""
 CORRIDOR_M: Final = 60.0
 HALF_WIDTH_M: Final = 1.0
@@ -135,8 +135,8 @@ def _in_corridor(found: Followed, odometry: Floats, truth: Floats) -> Row:
         "odometry across": _rms(by_odometry[:, 1]), "odometry along": _rms(by_odometry[:, 0]),
         "across": _rms(across), "along": _rms(along),
         "across at the end": float(abs(across[-1])), "along at the end": float(abs(along[-1])),
-        "across within 95 %": float((across**2 <= CHI2_95 * spreads[:, 1, 1]).mean()),
-        "along within 95 %": float((along**2 <= CHI2_95 * spreads[:, 0, 0]).mean()),
+        "across within 95 %": float((across**2 <= CHI2_95_ONE * spreads[:, 1, 1]).mean()),
+        "along within 95 %": float((along**2 <= CHI2_95_ONE * spreads[:, 0, 0]).mean()),
         "wrong": float((tracking & (off > np.maximum(WRONG_M, WRONG_SIGMAS * sigma))).mean()),
     }  # fmt: skip
 

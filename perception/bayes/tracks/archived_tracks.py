@@ -24,7 +24,7 @@ from perception.map_moves import MapMoves
 from perception.records import Structured
 
 ARCHIVED_READINGS: Final = 48
-"""Readings of an archived track: `OUTLINE_READINGS_MIN` of every other bearing, or more of fewer."""
+"""Readings of an archived track: `OUTLINE_READINGS_MIN` of 16 bearings, or more of fewer."""
 BINS: Final = "bins"
 """The field of a track that holds its readings, which an archived one keeps in another form."""
 
@@ -138,6 +138,8 @@ def move_rows(rows: Structured, moves: MapMoves) -> None:
 def newest_readings(bins: Structured) -> Structured:
     """Return the newest readings of bearings that lie evenly round, then the newest of each one: (≤ 48,) `Reading`.
 
+    Before them come the silences that are the newest of their bearing: they show that the object has left.
+
     Parameters
     ----------
     bins : (n,) record of `CircleBin` or `PolygonBin`
@@ -157,7 +159,9 @@ def newest_readings(bins: Structured) -> Structured:
     many, most = np.flatnonzero(heard == OUTLINE_READINGS_MIN), ARCHIVED_READINGS // OUTLINE_READINGS_MIN
     if len(many) > most:
         many = many[np.arange(most) * len(many) // most]
-    return found[np.lexsort((which, ranks, ~(is_new & np.isin(which, many))))][:ARCHIVED_READINGS]
+    is_silence = (ranks == 0) & (found["range_m"] >= FAR)
+    order = np.lexsort((which, ranks, ~(is_new & np.isin(which, many)), ~is_silence))
+    return found[order][:ARCHIVED_READINGS]
 
 
 def bearing_bins(places: Floats, count: int) -> NDArray[np.int64]:

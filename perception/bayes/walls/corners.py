@@ -223,27 +223,8 @@ def find_corners(s: StateRecord) -> None:
             locate(corner, lines)
     for c in range(CORNERS_MAX):
         if room.corners[c].is_used == PENDING:
-            keep_point(room, room.corners[c])
             room.corners[c].is_used = 0
     find_edges(room)
-
-
-@kernel
-def keep_point(room: WallMap, corner: RoomCorner) -> None:
-    """Keep a corner that lost a wall as a point, in the place of the end that was heard least if none is free."""
-    if corner.is_edge == 1 or corner.echoes <= ALONE_LEAD * corner.passes:
-        return
-    at, least = -1, corner.echoes
-    for c in range(EDGES_MAX):
-        edge = room.edges[c]
-        echoes = -1.0 if edge.is_used == 0 else edge.echoes
-        if edge.is_kept == 0 and echoes < least:
-            at, least = c, echoes
-    if at >= 0:
-        edge = room.edges[at]
-        clear_corner(edge)
-        copy_heard(corner, edge)
-        edge.x, edge.y, edge.is_edge, edge.is_used = corner.x, corner.y, 0, KEPT
 
 
 @kernel
@@ -329,7 +310,15 @@ def is_near_corner(room: WallMap, wall: int, x: float, y: float) -> bool:
 def point_of(
     room: WallMap, corners: Records[RoomCorner], count: int, q: Reading, p: SettingsRecord
 ) -> tuple[int, float]:
-    """Return the corner that explains an echo best, else −1, and its error as a share of the greatest explained."""
+    """Return the corner that explains an echo best, and the error as a share of the greatest explained; −1, 1: none.
+
+    Parameters
+    ----------
+    room, q, p
+        The noise, the reading and the settings.
+    corners, count
+        The corners or the edges, and their number.
+    """
     best = -1
     least = 1.0
     are_smooth = are_mirrors(room)
@@ -374,7 +363,15 @@ def enter_echo(room: WallMap, corner: RoomCorner, q: Reading) -> None:
 def enter_looks(
     room: WallMap, tracks: CircleTracks, corners: Records[RoomCorner], count: int, q: Reading, p: SettingsRecord
 ) -> None:
-    """Count a reading for or against the corners, or edges, towards which it looked, past any of the circles."""
+    """Count a reading for or against the corners towards which it looked.
+
+    Parameters
+    ----------
+    room, tracks, q, p
+        The noise, the circles, what lies behind which is not seen, the reading and the settings.
+    corners, count
+        The corners or the edges, updated, and their number.
+    """
     for c in range(count):
         corner = corners[c]
         if corner.is_used != KEPT:

@@ -69,7 +69,7 @@ real ones in 4 roundings, 12 in buildings) gain 0.10 to 0.50 a map, and stay 2.6
 among mirrors are refuted after 19 % of the way, with 0.6 after 24 %."""
 
 GRIDS_MAX: Final = 250
-"""Maps whose grids are kept, 79 MB in all, or 750 m of way. An older one is made again when the robot is there."""
+"""Maps whose grids are kept, 79 MB in all, at most 750 m of way. An older one is made again when the robot is there."""
 
 
 class SubmapGraph:
@@ -123,8 +123,8 @@ class SubmapGraph:
         self._submaps, self._nodes, self._links = Rows(Submap), Rows(Node), Rows(Link)
         self._grids: dict[int, Floats] = {}
         self._job: Iterator[Outcome | None] | None = None
-        self._way: tuple[tuple[int, ...], KnownWay] | None = None
-        """The known way as it was asked for last, and what it depends on."""
+        self._way: tuple[tuple[int, int], int, KnownWay, KnownWay] | None = None
+        """Maps compared and held, poses of the map that goes on, and the known way until it and with it."""
         self._readings[:] = self._trail[:] = 0.0
         self.held.reset()
         self._latest = np.full((len(self._mounts), 3), math.inf)
@@ -297,14 +297,20 @@ class SubmapGraph:
     def known_way(self) -> KnownWay:
         """Return the way as known now, in the map frame; only matches that the others bear out.
 
-        It is the same object until half a metre more is known, or a map.
+        It is the same object until some poses more are known, or a map.
         """
-        state = self._matched, self.count, self._trail_count // WAY_POSES
+        state, poses = (self._matched, self.count), self._trail_count // WAY_POSES
         if self._way is None or self._way[0] != state:
-            self._way = state, self._known_way()
-        return self._way[1]
+            self._way = state, -1, (of_maps := self._way_of_maps()), of_maps
+        _, known, of_maps, whole = self._way
+        if known != poses:
+            here = self._placed(self.count, self._trail[: self._trail_count, :3])
+            whole = of_maps._replace(path=np.concatenate([of_maps.path, here[:, :2]]))
+            self._way = state, poses, of_maps, whole
+        return whole
 
-    def _known_way(self) -> KnownWay:
+    def _way_of_maps(self) -> KnownWay:
+        """Return the way until the last map ended: its cost grows with the way, so it is asked for once a map."""
         nodes, links, submaps = self._nodes.archived_rows, self._links.archived_rows, self._submaps.archived_rows
         maps = np.zeros((len(nodes), 5))
         maps[:, 0], maps[:, 1] = nodes["x"], nodes["y"]
@@ -312,12 +318,11 @@ class SubmapGraph:
             maps[:, 2] = maps[:, 4] = 0.5 * spread_about(0, links, nodes)[:, 0]
         is_loop = (links["is_match"] != 0) & (links["by_scale"][:, OF_OTHER] != 0.0).any(axis=1)
         loops = links[is_loop & (links["weight"] > 0.5)]
-        paths = scaled(submaps["path"], self._scales)
-        path = [compose(pose_of(node), of_map) for node, of_map in zip(nodes, paths, strict=True)]
-        path.append(self._placed(len(nodes), self._trail[: self._trail_count, :3]))
-        return KnownWay(
-            np.concatenate(path)[:, :2], maps, np.column_stack([maps[loops["of"], :2], maps[loops["to"], :2]])
-        )
+        x, y, _ = np.moveaxis(scaled(submaps["path"], self._scales), -1, 0)
+        c, s = np.cos(nodes["theta"])[:, None], np.sin(nodes["theta"])[:, None]
+        path = np.stack([nodes["x"][:, None] + c * x - s * y, nodes["y"][:, None] + s * x + c * y], axis=-1)
+        ends = np.column_stack([maps[loops["of"], :2], maps[loops["to"], :2]])
+        return KnownWay(path.reshape(-1, 2), maps, ends)
 
     def localized(self) -> LocalizedPose:
         """Return where the robot was at the last firing, in the map frame."""

@@ -96,12 +96,14 @@ def test_of_many_readings_bearings_all_round_keep_as_many_as_the_outline_needs()
     assert max(np.diff([*full, full[0] + BEARING_BINS])) <= 4, "they lie all round"
 
 
-def test_silences_are_kept_where_they_are_the_newest() -> None:
-    """Otherwise an object that was carried away would come back from the archive."""
-    memory, one = filled(3, 0), zeros(Reading, 1)
+@pytest.mark.parametrize("echoes", [0, 4, 400])
+def test_silences_are_kept_where_they_are_the_newest(echoes: int) -> None:
+    """Otherwise an object that was heard all round and carried away would come back from the archive."""
+    memory, one = filled(3, echoes), zeros(Reading, 1)
     track = memory.tracks[0]
-    for k in range(8):
-        one[0] = (track.x + 2.0, track.y, -1.0, 0.0, 2.0 if k < 4 else np.inf, 0.0, 0.0)
+    for turn in np.repeat([0.1, 0.9, 1.7, 2.5], 6).tolist():
+        c, s = np.cos(turn), np.sin(turn)
+        one[0] = (track.x + 2.0 * c, track.y + 2.0 * s, -c, -s, np.inf, 0.0, 0.0)
         reservoir.keep_reading(track, track.x, track.y, records(Reading, one)[0])
     assert np.isinf(newest_readings(memory.circles["bins"][0])["range_m"][:4]).all()
 

@@ -45,37 +45,6 @@ def test_an_edge_beyond_a_doorway_stays_that_of_the_next_span() -> None:
     assert max(edges, key=lambda it: it.echoes).y == pytest.approx(1.2, abs=0.07)
 
 
-@pytest.mark.parametrize(
-    ("passes", "edge_echoes", "others", "is_kept"),
-    [(0.0, 0.0, None, True), (0.0, 0.0, 2.0, True), (0.0, 0.0, 9.0, False), (4.0, 0.0, None, False),
-     (0.0, 100.0, None, False)],
-)  # fmt: skip
-def test_a_corner_that_is_heard_stays_when_one_of_its_walls_leaves(
-    passes: float, edge_echoes: float, others: float | None, is_kept: bool
-) -> None:
-    """Without it a drum behind the corner explained its echoes, and was named."""
-    memory, room = corner_room()
-    corner = room.corners[0]
-    for _ in range(6):
-        wall_corners.enter_echo(room, corner, reading(0.5, 0.5, math.pi / 4, math.hypot(1.5, 1.5)))
-    corner.passes, room.edge_silences, room.edge_echoes = passes, 50.0, edge_echoes
-    room.walls[1].weight = 0.0
-    for edge in room.edges if others is not None else ():
-        edge.x, edge.echoes = edge.x if edge.is_used == 1 else 50.0, others or 0.0
-        edge.is_used = wall_corners.KEPT
-    wall_corners.find_corners(memory.s)
-    for _ in range(2):
-        wall_corners.find_corners(memory.s)
-    points = [it for it in room.edges if it.is_used == 1 and it.is_edge == 0]
-    assert room.corners[0].is_used == 0
-    assert [(it.echoes, it.far_echoes) for it in points] == [(6.0, 6.0)] * is_kept
-    assert [(it.x, it.y) for it in points] == [pytest.approx((2.0, 2.0), abs=0.02)] * is_kept
-    room.walls[1].weight = 50.0
-    wall_corners.find_corners(memory.s)
-    assert room.corners[0].is_used == 1
-    assert not any(it.is_used == 1 and it.is_edge == 0 for it in room.edges), "it is the corner's point again"
-
-
 def test_a_corner_keeps_its_echoes_while_its_walls_last() -> None:
     memory, room = corner_room()
     corner = room.corners[0]
