@@ -35,9 +35,9 @@ class Promise(NamedTuple):
 
 LIMITS: Sequence[str] = (
     "A ring that falls silent as a whole where little was ahead or beside it, or whose sensors each fire seldom: "
-    "most such silences are named at once, others by a line after half a metre, or after twice the longest silence "
-    "so far if that is more. After 4 m without anything new the robot creeps. What it had not heard before may be "
-    "touched until then.",
+    "most such silences are named at once, others by a line after half a metre or half a turn, or after twice the "
+    "longest silence so far if that is more. After 4 m without anything new the robot creeps. What it had not heard "
+    "before may be touched until then.",
     "Ranges that have been too long, or too short, by the same length since the ring's first readings, or that "
     "become so where the ring hears few echoes at that moment (three to eight: in 11 of 32 drives of rings of "
     "8, 16 and 24 sensors among mirrors something was touched when ranges became too long, in 0 of 16 when "

@@ -67,7 +67,7 @@ MISSED: Final = 0.9
 HONEST_MISS_MIN: Final = 0.04
 """An honest ring misses no less of its known echoes than this share: all surfaces end."""
 HONEST_MISS_MAX: Final = 0.6
-"""An honest ring misses no more of its known echoes than this share: some are heard."""
+"""An honest ring misses no more of its known echoes than this share, but where a mirror has left: some are heard."""
 MIRRORS_MISSED: Final = 0.4
 """Share of mirrors for each look that a sensor which turns misses more often. With .4 rings of 8 to 32 sensors that
 fall silent among rough walls are named within 8 s in 89 of 160 drives, in 91 if mirrors leave one by one; with 2, in

@@ -6,10 +6,10 @@ again it drives on. If its ring reaches far, so that it would hear any room, it 
 (`runtime.cycle.unheard_limit`).
 
 Later the ring may fail, or freeze: then it hears nothing new. A line of the log says so once that has lasted for
-longer than ever before in this run; a turn counts as well as a way, as it looks at something else. If old echoes were
-repeated most of that way, the robot drives slowly from there on until the next new echo: no honest ring does that for
-long. What a silent ring heard last holds for as far as it reached then, and few sensors often hear nothing for half a
-metre: after such a way it drives slowly, too. It does not stop.
+longer than ever before in this run; a turn counts as well as a way, as it looks at something else. If old echoes came
+until late in that silence, the robot drives slowly from there on until the next new echo: no honest ring does that
+for long. What a silent ring heard last holds for as far as it reached then, and few sensors often hear nothing for
+half a metre: after such a way it drives slowly, too. It does not stop.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ class EchoWatch:
 
     @property
     def _repeats(self) -> bool:
-        """Whether old echoes were repeated in most of this silence."""
+        """Whether the last old echo came in the later part of this silence."""
         return self.repeated_m >= REPEATED_SHARE * self.searched_m
 
     @property

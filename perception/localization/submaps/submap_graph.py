@@ -69,7 +69,7 @@ real ones in 4 roundings, 12 in buildings) gain 0.10 to 0.50 a map, and stay 2.6
 among mirrors are refuted after 19 % of the way, with 0.6 after 24 %."""
 
 GRIDS_MAX: Final = 250
-"""Maps whose grids are kept, 79 MB in all, at most 750 m of way. An older one is made again when the robot is there."""
+"""Maps whose grids are kept, 79 MB in all: at most 750 m of way. An older one is made again where it is needed."""
 
 
 class SubmapGraph:

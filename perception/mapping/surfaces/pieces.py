@@ -67,7 +67,8 @@ def offset_of(at: int) -> float:
 def capture(room: LocalMap, counts: CellCounts, begin: int, most: int) -> int:
     """Append occupied cells to the map's, row by row; return how many parts of rows were looked at.
 
-    Cells that find no room are left out. Their places in `counts.index` are written; it was 0 everywhere.
+    Cells that find no room are left out; weak ones leave the last quarter of it to the others. The places of cells in
+    `counts.index` are written; it was 0 everywhere.
 
     Parameters
     ----------
@@ -83,11 +84,12 @@ def capture(room: LocalMap, counts: CellCounts, begin: int, most: int) -> int:
         if counts.block_hits[i // BLOCK, j // BLOCK] == 0 or not RIM <= i < CELLS - RIM:
             continue
         for column in range(max(j, RIM), min(j + BLOCK, CELLS - RIM)):
-            if greatest_strength(counts, i, column) <= WEAK_MIN or room.cell_count >= SURFACE_CELLS_MAX:
+            least = WEAK_MIN if 4 * room.cell_count < 3 * SURFACE_CELLS_MAX else STRENGTH_MIN
+            if greatest_strength(counts, i, column) <= least or room.cell_count >= SURFACE_CELLS_MAX:
                 continue
             computed += 1
             strength = strength_of(counts, i, column)
-            if strength > WEAK_MIN:
+            if strength > least:
                 cell = room.cells[room.cell_count]
                 cell.i, cell.j, cell.strength, cell.owner = i, column, strength, FREE
                 room.cell_count += 1

@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from perception.kernel import Floats
-from perception.mapping.surfaces.parameters import CELL_M, CELLS, DIRECTIONS, OFF_LINE_M, STRENGTH_MIN, WHOLE
+from perception.mapping.surfaces.parameters import (
+    CELL_M,
+    CELLS,
+    DIRECTIONS,
+    OFF_LINE_M,
+    STRENGTH_MIN,
+    SURFACE_CELLS_MAX,
+    WHOLE,
+)
 from perception.mapping.surfaces.pieces import (
     ROW_PARTS,
     SEED_CELLS,
@@ -127,6 +135,18 @@ def test_weak_cells_start_no_piece_and_extend_none(strength: float, count: int) 
     cells["strength"], cells["owner"], local["piece_count"], local["at"] = strength, FREE, 0, 0
     assert grow_all(room[0], records(CellCounts, counts)[0], 10**9)
     assert local["piece_count"][0] <= count
+
+
+def test_weak_cells_leave_room_for_strong_ones() -> None:
+    _, whole, heard = mapped(np.array([[0.5, 0.0], [0.0, 0.5]]), echoes=0.4)
+    assert whole["cell_count"][0] > 0, "weak cells are taken"
+    assert whole["cells"]["strength"].max() < STRENGTH_MIN
+    local = zeros(LocalMap, 1)
+    local["cell_count"] = 3 * SURFACE_CELLS_MAX // 4
+    capture(records(LocalMap, local)[0], records(CellCounts, heard)[0], 0, 10**6)
+    assert local["cell_count"][0] == 3 * SURFACE_CELLS_MAX // 4
+    _, strong, _ = mapped(np.array([[0.5, 0.0], [0.0, 0.5]]))
+    assert strong["cell_count"][0] == whole["cell_count"][0]
 
 
 def test_a_few_cells_are_no_piece() -> None:
