@@ -28,6 +28,8 @@ class Beside(NamedTuple):
     """Radius of the body, m."""
     needed_m: float
     """Least distance from the goal at which the body passes it, m."""
+    is_line: bool = False
+    """Whether it is a no-go line, which nothing stands on."""
 
     @property
     def is_on_goal(self) -> bool:
@@ -40,8 +42,9 @@ class Beside(NamedTuple):
         if self.away_m >= self.needed_m:
             return ""
         more_m = math.ceil(20.0 * (self.needed_m - self.away_m)) / 20.0
+        what = "the no-go line there" if self.is_line else "what stands there"
         return (
-            f": what stands there is {self.away_m:.2f} m from the goal, and the robot needs {self.needed_m:.2f} m "
+            f": {what} is {self.away_m:.2f} m from the goal, and the robot needs {self.needed_m:.2f} m "
             f"(set the goal {more_m:.2f} m farther from it)"
         )
 

@@ -24,7 +24,9 @@ CONNECT_TIMEOUT_S: Final = 10.0
 WORKERS_TIMEOUT_S: Final = 120.0
 """There must be a worker by then."""
 QUIET_S: Final = 5.0
-"""Without a worker for so long, the user reads what is waited for. Those of this machine need about that to start."""
+"""Without a worker for so long, the user reads what is waited for."""
+LOCAL_QUIET_S: Final = 20.0
+"""The same for workers of this machine, which need a quarter of it to start, and more while it is busy."""
 AHEAD: Final = 2
 """Runs under way for each thread of a worker: the next is there when one ends."""
 COUNT_PERIOD_S: Final = 5.0
@@ -188,7 +190,8 @@ def await_worker(
     problem, hint : str
         What the error says if none comes, or all of `started` end.
     tell : callable
-        Gets both in a line after `QUIET_S`.
+        Gets both in a line after `QUIET_S`; for workers of this machine, of which one lives, the problem alone after
+        `LOCAL_QUIET_S`.
     clock : callable
         Monotonic, s.
 
@@ -198,6 +201,7 @@ def await_worker(
         There is no worker.
     """
     begin_s, is_said = clock(), False
+    quiet_s, more = (LOCAL_QUIET_S, "") if started else (QUIET_S, f"; {hint}")
     while True:
         have_died = bool(started) and all(process.poll() is not None for process in started)
         try:
@@ -208,8 +212,8 @@ def await_worker(
             waited_s = clock() - begin_s
             if waited_s >= WORKERS_TIMEOUT_S:
                 raise UserError(f"{problem} after {WORKERS_TIMEOUT_S:g} s; {hint}", FAILED) from None
-            if waited_s >= QUIET_S and not is_said:
+            if waited_s >= quiet_s and not is_said:
                 is_said = True
-                tell(f"{problem} yet, for which up to {WORKERS_TIMEOUT_S:g} s are waited; {hint}")
+                tell(f"{problem} yet, for which up to {WORKERS_TIMEOUT_S:g} s are waited{more}")
         else:
             return

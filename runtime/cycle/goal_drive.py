@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Final
 
+import numpy as np
+
 from behaviors.arbiter import Decision, Drive, arbitrate
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import Zone, avoid_static_obstacle
@@ -232,13 +234,20 @@ def _arbitrate(
 
 
 def _beside(percept: Percept, goal: Goal, distance_m: float, settings: Settings) -> Beside:
-    """Return what surely stands nearest to the goal, which the robot is near."""
+    """Return what surely stands nearest to the goal, which the robot is near, or the no-go line there."""
     body_m = settings.body.radius_m
     needed_m = body_m + _margin_m(settings)
     if distance_m >= AT_GOAL_M:
         return NOTHING_BESIDE
     there = cells_near(percept, goal.x, goal.y, needed_m, settings.behaviors.follow_valley)
-    return Beside(float(there.distances[there.certainties == 1.0].min(initial=math.inf)), body_m, needed_m)
+    away_m = float(there.distances[there.certainties == 1.0].min(initial=math.inf))
+    lines = percept.obstacles[len(percept.obstacles) - percept.no_go :].reshape(-1, 2)
+    line_m = float(np.hypot(lines[:, 0] - goal.x, lines[:, 1] - goal.y).min(initial=math.inf))
+    # A no-go line also fills the cells of the grid that it crosses, whose middles may lie nearer to the goal.
+    cell_m = 0.0 if percept.occupancy is None else percept.occupancy.cell_m
+    if line_m < math.inf and line_m <= 1e-9 + away_m + math.sqrt(0.5) * cell_m:
+        return Beside(line_m, body_m, needed_m, is_line=True)
+    return Beside(away_m, body_m, needed_m)
 
 
 def _margin_m(settings: Settings) -> float:

@@ -12,7 +12,7 @@ from runtime.analysis.plots.plot_style import CLUSTER, INK, MUTED
 
 
 def draw_known_way(axes: Axes, known: KnownWay, frame: Frame) -> list[Line2D]:
-    """Draw the way as known at the end, its loop closures, and the 95 % ellipse of each map of it.
+    """Draw the way as known at the end, its loop closures, and the uncertainty of each map of it.
 
     The way is in the map frame: the path by odometry begins where it does, and drifts away from it.
     """
@@ -21,7 +21,7 @@ def draw_known_way(axes: Axes, known: KnownWay, frame: Frame) -> list[Line2D]:
     path = frame.points(known.path)
     (line,) = axes.plot(path[:, 0], path[:, 1], color=INK, linewidth=1.4, zorder=3, gid="known-path")
     line.set_label("path as known at the end")
-    handles = [line, Line2D([], [], color=MUTED, linewidth=0.5, label="95 % of a place")]
+    handles = [line, Line2D([], [], color=MUTED, linewidth=0.5, label="uncertainty of a map")]
     if len(known.loops):
         ends = frame.points(known.loops.reshape(-1, 2)).reshape(-1, 2, 2)
         axes.add_collection(LineCollection(list(ends), colors=CLUSTER, linewidths=1.0, zorder=4, gid="loops"))

@@ -68,10 +68,12 @@ def draw_world(axes: Axes, timeline: Timeline, frame: Frame) -> list[Line2D]:
     return handles
 
 
-def draw_path(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) -> list[Line2D]:
-    """Draw the robot at the last pose and its path.
+def draw_path(
+    axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float, end: Pose | None = None
+) -> list[Line2D]:
+    """Draw the path, and the robot at its last pose or at another `end`.
 
-    Poses are in odometry's frame.
+    The path is in odometry's frame.
     """
     if not poses:
         return []
@@ -80,8 +82,9 @@ def draw_path(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) 
         path[:, 0], path[:, 1], color=ROBOT, linewidth=1.6, linestyle=(0, (4, 2)), zorder=2, gid="path"
     )
     line.set_label("path by odometry")
-    last = poses[-1]
-    body = Circle((path[-1, 0], path[-1, 1]), radius_m / frame.unit_m, facecolor="none", edgecolor=ROBOT,
+    last = poses[-1] if end is None else end
+    x, y = frame.points(np.array([[last.x, last.y]]))[0]
+    body = Circle((x, y), radius_m / frame.unit_m, facecolor="none", edgecolor=ROBOT,
                   linewidth=1.6, zorder=5)  # fmt: skip
     body.set_gid("robot")
     axes.add_patch(body)

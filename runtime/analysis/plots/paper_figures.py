@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 
 from config.load import load_world
 from config.units import FOOT_M
+from drivers.messages import Pose
 from perception.detected_object import turned_object
 from runtime.analysis.plots.cross_arcs import heard_cross_paths
 from runtime.analysis.plots.geometry import Frame, window
@@ -136,7 +137,7 @@ def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
     if timeline.known_way is not None:
         known_way = timeline.known_way
         loops = counted(len(known_way.loops), "loop closure")
-        line = f"{loops}; ellipses hold a map of the way in 95 %, seen from the first; walls as corrected"
+        line = f"{loops}; ellipses: uncertainty of each map, seen from the first; walls as corrected"
         to_map = timeline.odometry_from_map.inverse()
         walls = tuple(turned_object(to_map, wall) for wall in last.walls)
         drawn["path"] = _figure(
@@ -144,19 +145,28 @@ def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
             "Path before and after its correction",
             line,
             lambda axes: draw_walls(axes, walls, frame) + draw_known_way(axes, known_way, frame),
+            to_map,
         )
     return drawn
 
 
-def _figure(canvas: Canvas, title: str, line: str, draw: Callable[[Axes], list[Line2D]]) -> Figure:
-    """Return a figure with what `draw` draws, over the true world, the path and the bookmarks."""
+def _figure(
+    canvas: Canvas, title: str, line: str, draw: Callable[[Axes], list[Line2D]], to_map: Pose | None = None
+) -> Figure:
+    """Return a figure with what `draw` draws, over the true world, the path, the robot and the bookmarks.
+
+    With `to_map`, odometry's frame of the end in the map frame, the robot stands where it is in the map, and there
+    are no bookmarks: only odometry's places of them are known.
+    """
     figure, axes = canvas.figure()
     timeline, frame = canvas.timeline, canvas.frame
     handles = draw(axes)
     handles += draw_world(axes, timeline, frame)
     poses = [*(odometry.pose for _, odometry in timeline.odometry), *(m.pose for m in timeline.snapshots[-1:])]
-    handles += draw_path(axes, poses, frame, timeline.settings.body.radius_m)
-    handles += draw_bookmarks(axes, timeline.bookmarks, frame)
+    end = to_map.compose(poses[-1]) if to_map is not None and poses else None
+    handles += draw_path(axes, poses, frame, timeline.settings.body.radius_m, end)
+    if to_map is None:
+        handles += draw_bookmarks(axes, timeline.bookmarks, frame)
     figure.suptitle(title, x=0.01, ha="left", fontsize=11.0, fontweight="bold")
     axes.set_title(line, loc="left", fontsize=8.5, fontweight="normal", color=MUTED)
     legend(figure, handles)

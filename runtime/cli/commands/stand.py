@@ -106,9 +106,9 @@ def read_stand(
     settings, firings = read_firings(
         file, robot, lambda: check_outputs({"--json": json_file}, (file,), force=force), options
     )
-    if at_s is not None and firings and at_s > firings[-1].robot_s:
+    if at_s is not None and firings and round(at_s, 2) > round(firings[-1].robot_s, 2):  # as the error has them
         last = f"the last firing is at {firings[-1].robot_s:.2f} s"
-        raise UserError(f"{file}: ends before --at {at_s:g} by the robot's clock; {last}", FAILED)
+        raise UserError(f"{file}: ends before --at {at_s:.2f} by the robot's clock; {last}", FAILED)
     stand = stand_of(firings, math.inf if at_s is None else at_s)
     if not stand:
         first = f" the first firing is at {firings[0].robot_s:.2f} s" if firings else " it holds no firing"

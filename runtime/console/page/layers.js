@@ -124,7 +124,7 @@ const TABLE = [
   [
     "known_way",
     "front",
-    "way as corrected by its maps: path, 95 % ellipse of each map, loop closures",
+    "way as corrected by its maps: path, uncertainty of each map, loop closures",
     drawKnownWay,
     true,
     "M4 15c8-12 14 6 32-9M20 6l12 9M10 6a4 3 0 1 1-.1 0Z",

@@ -53,14 +53,29 @@ def open_ring_log(
         The file cannot be read, is invalid, or its conventions are ambiguous; the text names the option to give.
     """
     options.check()
-    rows = read_ring_log(
+    rows = _rows(path, robot, options)
+    first = FIRST if path.is_file() else FIRST_OF_PIPE
+    yield from converted_firings(rows, path, robot, options, warn, first=first)
+
+
+def check_begin(path: Path, robot: RobotConfig, options: RingLogOptions) -> None:
+    """Raise `RingLogError` if the options, the file's header or its first row are invalid; no row of a pipe is read.
+
+    This is quick, other than the first firing of `open_ring_log`, for which the conventions are decided.
+    """
+    options.check()
+    if path.is_file() or not path.exists():
+        next(_rows(path, robot, options), None)
+
+
+def _rows(path: Path, robot: RobotConfig, options: RingLogOptions) -> Iterator[Firing]:
+    """Return the firings as the file has them."""
+    return read_ring_log(
         path,
         sensors=robot.ring.sensor_count,
         is_strict=(options.silence, options.not_fired) == ("inf", "empty"),
         servos=ServoColumns(robot.ring),
     )
-    first = FIRST if path.is_file() else FIRST_OF_PIPE
-    yield from converted_firings(rows, path, robot, options, warn, first=first)
 
 
 def converted_firings(

@@ -83,6 +83,8 @@ DENSE: Final = 0.5
 IMPERIAL: Final = ("in", "ft")
 TWICE: Final = 2.0
 """Ranges change by this much of the way where the whole path of the sound was written down, there and back."""
+TWICE_NAT: Final = 1.0
+"""By how much this must be more likely than units of two systems: inches beside cm, by 2.54, gain 1.5 at most."""
 STEPS_MIN: Final = 30
 """Steps on which a speed or a rate rests."""
 ECHOES_MIN: Final = 50
@@ -148,7 +150,8 @@ def find_units(
         )
     if scores[default] > scores[best] - SURE_NAT:
         best = default
-    _check_ways(best, ratios)
+    if "auto" in given[1:]:
+        _check_ways(best, ratios)
     if best == default:
         return default, scores
     reason = _reason(default, best, facts, robot)
@@ -239,10 +242,10 @@ class _Facts(NamedTuple):
 
 
 def _check_ways(units: Units, ratios: Floats) -> None:
-    """Raise an error if ranges are the whole path of the sound: surely, or maybe where the units mix two systems."""
+    """Raise an error if ranges are the whole path of the sound: surely, or more likely than units of two systems."""
     expected = LENGTHS[units.length] / LENGTHS[units.range_]
     is_mixed = (units.length in IMPERIAL) != (units.range_ in IMPERIAL)
-    surely = _way_score(ratios, expected) + (-APART_NAT if is_mixed else PROOF_NAT)
+    surely = _way_score(ratios, expected) + (TWICE_NAT if is_mixed else PROOF_NAT)
     if len(ratios) and max(_way_score(ratios, TWICE * one) for one in (expected, 1.0)) > surely:
         raise RingLogError(
             f"ranges change by {float(np.median(ratios)):.2g} for each unit of the way to what is heard: halve them "
@@ -269,11 +272,8 @@ def _units_score(units: Units, facts: _Facts, robot: RobotConfig) -> float:
     t, length, range_ = TIMES[units.time], LENGTHS[units.length], LENGTHS[units.range_]
     score = METRES_NAT * (units.length == units.range_ == "m")
     score += IMPOSSIBLE_NAT * len(_contradictions(units, facts, robot))
-    if facts.period > 0.0:
-        score += _ln_normal(facts.period * t / ring.firing.step_period_s, PERIOD_LN)
-    if facts.speed > 0.0:
-        speed = facts.speed * length / t / body.speed_max_m_s
-        score += _ln_normal(speed / USUAL_SPEED, SPEED_LN)
+    score += _ln_normal(facts.period * t / ring.firing.step_period_s, PERIOD_LN)
+    score += _ln_normal(facts.speed * length / t / body.speed_max_m_s / USUAL_SPEED, SPEED_LN)
     if len(facts.echoes) >= ECHOES_MIN:
         score += _range_score(facts, range_, robot)
     return score
@@ -391,9 +391,8 @@ def way_ratios(table: Table, robot: RobotConfig, yaw: Floats, hand: int) -> Floa
         dx, dy = x[b] - x[a], y[b] - y[a]
         far = np.hypot(dx, dy)
         turned = np.abs(np.angle(np.exp(1j * (yaw[b] - yaw[a]))))
-        along = (dx * np.cos(yaw[a] + mount.angle_rad) + dy * np.sin(yaw[a] + mount.angle_rad)) / np.maximum(
-            far, 1e-300
-        )
+        beam = yaw[a] + mount.angle_rad
+        along = (dx * np.cos(beam) + dy * np.sin(beam)) / np.maximum(far, 1e-300)
         good = (np.abs(along) > PAIR_ALONG) & (turned < 0.1) & (far < 3.0 * least)
         change = (table.ranges[a[good], sensor] - table.ranges[b[good], sensor]) / (far * along)[good]
         found.append(change[change > 0.0])

@@ -15,12 +15,14 @@ from pydantic import ValidationError
 from behaviors.arbiter import Drive
 from behaviors.leave_canyon import leave_canyon
 from behaviors.move_to_goal import Goal
+from behaviors.no_go import with_no_go, zones_of
 from behaviors.response import Response
 from config.load import load_settings
+from config.places import NoGoLineConfig, PlacesConfig
 from drivers.messages import Pose, Twist
-from perception.percept import Percept
+from perception.percept import OccupancyWindow, Percept
 from runtime.cycle.drive_requests import Legs
-from runtime.cycle.goal_drive import GoalDrive, drive_to_goal
+from runtime.cycle.goal_drive import GoalDrive, _beside, drive_to_goal
 from runtime.cycle.step import STANDSTILL
 from runtime.recording.channels import decode, encode
 from runtime.recording.schema import Keyframe, carried_state, keyframe, state_fields
@@ -48,6 +50,20 @@ def test_vfh_plus_answers_at_once_and_the_look_ahead_follows_quantum_by_quantum(
     assert all(earlier < later for earlier, later in pairwise(found))
     assert goal_drive(script).search.way
     assert goal_drive(script).search.reaches
+
+
+@pytest.mark.parametrize("offset_m", [0.0, 0.03, 0.06, 0.09])
+def test_a_goal_beside_a_no_go_line_is_not_said_to_have_something_stand_there(offset_m: float) -> None:
+    settings, goal = load_settings("hallway"), Goal(0.5, offset_m)
+    away_m = settings.body.radius_m + 0.01
+    grid = OccupancyWindow(np.full((64, 64), 0.5, np.float32), -3.2, -3.2, 0.1)
+    seen = Percept(Pose(0.0, 0.0, 0.0), np.array([[0.5, offset_m + away_m]]), EVERYWHERE, occupancy=grid)
+    assert f"what stands there is {away_m:.2f} m from" in _beside(seen, goal, 0.5, settings).goal_fault
+    line = NoGoLineConfig(points_m=((-3.0, offset_m - away_m), (3.0, offset_m - away_m)))
+    zones = zones_of(PlacesConfig(no_go_line=(line,)))
+    fenced = with_no_go(replace(seen, obstacles=np.zeros((0, 2))), zones, Pose(0.0, 0.0, 0.0), away_m - 0.1)
+    assert fenced.no_go > 0
+    assert f"the no-go line there is {away_m:.2f} m from" in _beside(fenced, goal, 0.5, settings).goal_fault
 
 
 def test_without_a_look_ahead_it_is_vfh_plus_and_without_a_gain_move_to_goal() -> None:

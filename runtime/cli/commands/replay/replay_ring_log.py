@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -43,12 +42,12 @@ def replay_log(
     console = EscapingConsole(stderr=True)
     check_outputs({"--json": both.json, "--trajectory": trajectory, "--path": path}, (log,), force=force)
     corrects_drift = localized.localize and map_file is None
-    from runtime.recording.conventions.reading import open_ring_log
+    from runtime.recording.conventions.reading import check_begin, open_ring_log
     from runtime.recording.ring_log_replay import replay_firings, replay_in_known_room, replay_localized
 
     warnings: list[str] = []
     heard = open_ring_log(Path(log), settings, options, warnings.append)
-    first = next(heard)  # reports an invalid file before kernels are compiled
+    check_begin(Path(log), settings, options)  # an error in the call is said before kernels are compiled
     prepare_kernels(settings, console, (*needed_parts(settings), *([LOCALIZATION] if corrects_drift else [])))
     rows: list[str] = []
     path_rows: list[str] = []
@@ -60,7 +59,7 @@ def replay_log(
         path_rows.append(trajectory_row(t, here))
 
     with progress(console, "replaying") as step:
-        firings = _each(itertools.chain((first,), heard), step)
+        firings = _each(heard, step)
         if map_file is not None:
             summary = replay_in_known_room(settings, firings, on_pose)
         elif corrects_drift:

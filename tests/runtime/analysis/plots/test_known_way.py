@@ -1,4 +1,4 @@
-"""The way as known at the end: ellipses of 95 %, loop closures from place to place, in the figure's unit."""
+"""The way as known at the end: uncertainty of its maps, loop closures from place to place, in the figure's unit."""
 
 from __future__ import annotations
 

@@ -7,9 +7,11 @@ import re
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 from matplotlib.text import Text
 
 from config.load import load_world
+from drivers.messages import Pose
 from runtime.analysis.plots.figure_files import styled, svg_of
 from runtime.analysis.plots.paper_figures import HEIGHT_MAX_IN, HEIGHT_MIN_IN, Canvas, paper_figures, pictures
 from runtime.analysis.plots.plot_style import WIDTH_IN
@@ -59,9 +61,16 @@ def test_the_evidence_grid_lies_in_the_figure_where_it_lay() -> None:
 
 
 def test_a_corrected_path_has_a_figure() -> None:
-    drawn = pictures(with_known_way(synthetic_timeline()), "ft")
+    run = with_known_way(synthetic_timeline())
+    run.odometry_from_map = Pose(0.3, -0.2, 0.1)
+    drawn = pictures(run, "ft")
     assert list(drawn) == ["raw", "segments", "clusters", "models", "path"]
     assert {"path", "known-path", "loops", "certainty"} <= gids(drawn["path"])
+    assert "bookmark-1" not in gids(drawn["path"]), "only odometry's places of them are known"
+    (body,) = (one for one in drawn["path"].findobj(Circle) if one.get_gid() == "robot")
+    assert run.last is not None
+    here = run.odometry_from_map.inverse().compose(run.last.pose)
+    assert np.allclose(body.get_center(), Canvas(run, "ft").frame.points(np.array([[here.x, here.y]]))[0])
     assert any("1 loop closure;" in text.get_text() for text in drawn["path"].findobj(Text))
 
 

@@ -43,6 +43,11 @@ def test_calls_that_show_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[s
         in capsys.readouterr().err
     )
     assert run_command(["stand", str(log), "--at", "60"]) == FAILED
-    assert "ends before --at 60 by the robot's clock; the last firing is at 0.50 s" in capsys.readouterr().err
-    assert run_command(["stand", str(log)]) == FAILED
+    assert "ends before --at 60.00 by the robot's clock; the last firing is at 0.50 s" in capsys.readouterr().err
+    unix = Firing(1764354004.756, Pose(0.0, 0.0, 0.0), 0.0, np.where(np.arange(24) == 3, 1.0, np.nan))
+    write_ring_log(log, [unix])
+    assert run_command(["stand", str(log), "--at", "1764354010"]) == FAILED
+    said = capsys.readouterr().err
+    assert "ends before --at 1764354010.00 by the robot's clock; the last firing is at 1764354004.76 s" in said
+    assert run_command(["stand", str(log), "--at", "1764354004.76"]) == FAILED
     assert "no surface was heard over three different paths" in capsys.readouterr().err

@@ -21,6 +21,7 @@ from runtime.recording.conventions.units import (
     EDGE_NAT,
     PROOF_NAT,
     Units,
+    _check_ways,
     _edge_score,
     _Facts,
     _range_score,
@@ -74,6 +75,27 @@ def test_ranges_that_are_the_whole_path_of_the_sound_are_refused(drive: Drive, p
         found(drive, table)
     with pytest.raises(RingLogError, match="halve them if"):
         found(drive, in_units(replace(drive, ranges=2.0 * drive.ranges), Units("ms", "mm", "mm")))
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_inches_beside_cm_are_found(seed: int) -> None:
+    """Their ratio of 2.54 is near 2, that of a path there and back; few ratios say nothing of either."""
+    drive, units = make_drive(seed, "p3dx", "room", "specular"), Units("s", "in", "cm")
+    table = in_units(drive, units)
+    assert found(drive, table) == units
+    ratios = way_ratios(table, drive.settings, table.pose[:, 3], 1)
+    for few in (units, Units("s", "m", "ft"), Units("s", "cm", "in")):
+        scaled = ratios[:: len(ratios) // 4] / 2.54 * LENGTHS[few.length] / LENGTHS[few.range_]
+        _check_ways(few, scaled)
+
+
+def test_units_of_length_that_are_said_are_not_doubted(drive: Drive) -> None:
+    table, options = in_units(replace(drive, ranges=2.0 * drive.ranges), Units()), AUTO
+    ratios = way_ratios(table, drive.settings, table.pose[:, 3], 1)
+    with pytest.raises(RingLogError, match="halve them if"):
+        find_units(table, Silence(), drive.settings, replace(options, range_unit="cm"), "rad", ratios)
+    said = replace(options, length_unit="in", range_unit="cm")
+    assert find_units(table, Silence(), drive.settings, said, "rad", ratios)[0][1:] == ("in", "cm")
 
 
 @pytest.mark.parametrize("unit", ["min", "h", "d"])
