@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from types import MappingProxyType
 from typing import Final
 
@@ -51,11 +52,6 @@ SONAR_OFF: Final = (
     "turn it off: find it if this message returns"
 )
 
-OTHER_DISCS: Final = (
-    "the robot reports sonars, and none of those that the robot file lists, {} to {}: name the robot's own file, or "
-    "its numbers of the sonars in arcos.discs"
-)
-
 STOP_PRESSED: Final = (
     "the STOP button of the robot is pressed, which switches its motors off: release it, then arm again"
 )
@@ -85,6 +81,15 @@ _UNANSWERED: Final = MappingProxyType(
 )
 
 
+def other_discs(discs: Collection[int]) -> str:
+    """Return the message about a robot that measures none of the sonars that its file lists."""
+    listed = ", ".join(map(str, sorted(discs)))
+    return (
+        f"the robot reports sonars, and none of those that the robot file lists, {listed}: name the robot's own "
+        f"file, or its numbers of the sonars in arcos.discs"
+    )
+
+
 def watchdog_note(deadman_s: float) -> str:
     """Return the message about a base that drives on for long if this program is killed."""
     return (
@@ -99,11 +104,16 @@ def wrong_robot(name: RobotName, config: RobotConfig) -> str | None:
     subclass, known = name.subclass, config.arcos.subclasses
     if not known or subclass is None or subclass.lower() in {one.lower() for one in known}:
         return None
-    model = f"is a {one_line(subclass)}" if subclass else "does not say of which model it is"
+    shown, models = one_line(name.name or ""), ", ".join(known)
+    if not subclass:
+        return (
+            f"the robot '{shown}' does not say of which model it is, and the robot file is for {models}: the factors "
+            f"of its odometry may be others; choose the robot's own file, or, if it is one of these, set "
+            f"arcos.subclasses to [], which accepts any"
+        )
     return (
-        f"the robot '{one_line(name.name or '')}' {model}, and the robot file is for "
-        f"{', '.join(known)}, whose odometry has other factors; choose the robot's own file, or add its subclass to "
-        f"arcos.subclasses"
+        f"the robot '{shown}' is a {one_line(subclass)}, and the robot file is for {models}, whose odometry has "
+        f"other factors; choose the robot's own file, or add its subclass to arcos.subclasses"
     )
 
 

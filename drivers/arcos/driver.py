@@ -22,7 +22,7 @@ from drivers.arcos.frames import EncoderPacket, Packet, ResetNotice, Sip, SipFla
 from drivers.arcos.handshake import CLOSE, STOP, Handshake, Stage
 from drivers.arcos.line_load import SIP_BYTES, traffic_of
 from drivers.arcos.pose_stamping import SIP_PERIOD_S, PoseStamper
-from drivers.arcos.supervision import Enabling, Halting, ReceiverMonitor
+from drivers.arcos.supervision import DiscMonitor, Enabling, Halting, ReceiverMonitor
 from drivers.arcos.wire_units import (
     RANGE_UNIT_M,
     discs_of,
@@ -68,6 +68,7 @@ class ArcosDriver(Session[PoseStamper]):
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
         self._discs = discs_of(config)
+        self._disc_monitor = DiscMonitor(self._discs)
         finer = line_diagnostics.finer_than_line(config.ring.resolution_m, RANGE_UNIT_M)
         if finer is not None:
             raise DriverError(finer)
@@ -97,6 +98,8 @@ class ArcosDriver(Session[PoseStamper]):
         moving_s = self._halting.moving_s(self._run_s)
         if self._state is LineState.READY and moving_s > self._moving_max_s:
             return diagnostics.not_stopping(moving_s)
+        if self._problem is None and self._disc_monitor.are_others:
+            return diagnostics.other_discs(self._discs)
         return super().problem
 
     @property
@@ -250,7 +253,7 @@ class ArcosDriver(Session[PoseStamper]):
         """Drop all commands but a halt, and all that does not outlast an interruption."""
         self._queue.clear()
         self._drive, self._is_set_up = None, False
-        self._enabling, self._receiver = Enabling(), ReceiverMonitor()
+        self._enabling, self._receiver, self._disc_monitor = Enabling(), ReceiverMonitor(), DiscMonitor(self._discs)
         self.stamper.break_off()
         self._bad_at_sip = 0
 
@@ -366,8 +369,9 @@ class ArcosDriver(Session[PoseStamper]):
         self._flags |= flags
         self._battery = sip.battery_10 or sip.battery
         self._firings += firings
-        if sip.sonar and {one.number for one in sip.sonar}.isdisjoint(self._discs):
-            self._note_once(diagnostics.OTHER_DISCS.format(min(self._discs), max(self._discs)))
+        self._disc_monitor.observe(sip, is_set_up=not self._queue)
+        if self._disc_monitor.are_others:
+            self._note_once(diagnostics.other_discs(self._discs))
         self._follow_status(SipFlags(sip.flags))
 
     def _begin_session(self, sip: Sip) -> None:

@@ -1,8 +1,9 @@
-"""Supervision of a robot that acknowledges nothing: whether it stops, starts and still receives."""
+"""Supervision of a robot that acknowledges nothing: whether it stops, starts, receives, and has the file's sonars."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Final
 
 from drivers.arcos.commands import Command, CommandNumber
@@ -21,6 +22,8 @@ _SEEN_S: Final = 0.15
 """Time after which a SIP reports what a command did, s: more than a period."""
 _UNSUPPORTED: Final = 8
 """Requests without any answer after which a robot counts as one that does not know them."""
+_STRANGE_SIPS: Final = 5
+"""So many SIPs in a row with sonars, and none that the robot file lists, are no rest of an earlier sequence."""
 
 
 class Halting:
@@ -166,3 +169,28 @@ class ReceiverMonitor:
     def unanswered_s(self, run_s: float) -> float:
         """Return how long ago the first request was sent that is not answered; 0 if all are."""
         return run_s - self._first_s if self._is_supported and self._unanswered > 0 else 0.0
+
+
+class DiscMonitor:
+    """Watches for a robot that measures sonars and none of those that its file lists.
+
+    The first SIPs of a session are of the robot's own sequence, which may begin with others.
+    """
+
+    def __init__(self, discs: Collection[int]) -> None:
+        self._discs = frozenset(discs)
+        self._strange = 0
+        """SIPs in a row with sonars and no listed one."""
+
+    @property
+    def are_others(self) -> bool:
+        """Whether only others have been reported for long."""
+        return self._strange >= _STRANGE_SIPS
+
+    def observe(self, sip: Sip, *, is_set_up: bool) -> None:
+        """Take a SIP; one without sonars says nothing, and one before the end of the set-up begins anew."""
+        if not is_set_up:
+            self._strange = 0
+        elif sip.sonar:
+            are_others = self._discs.isdisjoint(one.number for one in sip.sonar)
+            self._strange = self._strange + 1 if are_others else 0

@@ -104,9 +104,9 @@ def write_world(file: str, given: Given, *, yes: bool, force: bool) -> int:
     width = ask.number("width", "Size of the room along x, m", 8.0, 1.0, 1000.0)
     depth = ask.number("depth", "Size of the room along y, m", 6.0, 1.0, 1000.0)
     drums = ask.count("drums", "Number of drums", 4, 0, 12)
+    ask.refuse_unused("--drums", ("drum_radius", "surfaces") if drums else ("surfaces",))
     radius = ask.number("drum_radius", "Radius of a drum, m", 0.3048, 0.02, 0.1 * min(width, depth)) if drums else 0.0
     surfaces = ask.choice("surfaces", "How surfaces reflect", ("cone", "specular", "rays"))
-    ask.refuse_unused("--drums")
     x, y = 0.5 * width, 0.5 * depth
     corners = [(-x, -y), (x, -y), (x, y), (-x, y)]
     walls = "".join(
@@ -138,6 +138,7 @@ def write_model(file: str, given: Given, *, yes: bool, force: bool) -> int:
     ask = _questions(file, given, yes=yes, force=force)
     name = ask.text("name", "What such an object is called", Path(file).stem)
     is_round = ask.choice("shape", "Its shape", ("round", "box")) == "round"
+    ask.refuse_unused("--shape", ("radius",) if is_round else ("length", "width"))
     if is_round:
         radius = ask.number("radius", "Its radius, m", 0.3048, 0.02, 10.0)
         turns = [2.0 * math.pi * k / CORNERS for k in range(CORNERS)]
@@ -147,7 +148,6 @@ def write_model(file: str, given: Given, *, yes: bool, force: bool) -> int:
         x = 0.5 * ask.number("length", "Its length, m", 0.6, 0.02, 20.0)
         y = 0.5 * ask.number("width", "Its width, m", 0.4, 0.02, 20.0)
         points, arc = [(x, -y), (x, y), (-x, y), (-x, -y)], ""
-    ask.refuse_unused("--shape")
     rows = "".join(f"  [{x:.6g}, {y:.6g}],\n" for x, y in points)
     text = f"""# An object of your own; the origin is the point whose position is reported.
 name = {_json(name)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, TypeVar
 
 from config.errors import WRONG_CALL, UserError
@@ -84,13 +84,15 @@ class Questions:
         self._used.add(name)
         return bool(self._given.get(name))
 
-    def refuse_unused(self, depends_on: str) -> None:
-        """Refuse options that no question has asked for: they have no effect.
+    def refuse_unused(self, depends_on: str, to_come: Collection[str] = ()) -> None:
+        """Refuse options that no question has asked for in this round, nor will: they have no effect.
 
         Parameters
         ----------
         depends_on : str
             The options on which it depends what is asked for.
+        to_come : collection of str
+            What is still to be asked for.
 
         Raises
         ------
@@ -98,7 +100,7 @@ class Questions:
             There is such an option.
         """
         given = (name for name, value in self._given.items() if value is not None and value is not False)
-        unused = [f"--{name.replace('_', '-')}" for name in given if name not in self._used]
+        unused = [f"--{name.replace('_', '-')}" for name in given if name not in {*self._used, *to_come}]
         if unused:
             raise UserError(
                 f"{', '.join(unused)}: no meaning beside the other options and answers; leave out, or choose another "
@@ -117,6 +119,7 @@ class Questions:
         if not self._asked:
             raise UserError(refusal, WRONG_CALL)
         self._asked = 0
+        self._used.clear()  # another answer may ask for other options
         sys.stderr.write(f"{one_line(refusal)}\nOnce more: Enter keeps an answer.\n")
 
     def _answer(self, name: str, question: str, default: T, parse: Callable[[str], T]) -> T:

@@ -30,12 +30,18 @@ def test_a_robot_of_the_files_models_or_without_a_name_is_accepted(subclass: str
 
 @pytest.mark.parametrize(
     ("subclass", "said"),
-    [("p3at", "is a p3at"), ("p3dx-sh", "is a p3dx-sh"), ("", "does not say of which model it is")],
+    [
+        ("p3at", "is a p3at"),
+        ("p3dx-sh", "is a p3dx-sh"),
+        ("", "does not say of which model it is"),
+    ],
 )
 def test_a_robot_with_other_factors_is_refused(subclass: str, said: str) -> None:
     message = wrong_robot(RobotName("a\x1b[2J", "Pioneer", subclass), P3DX_FILE) or ""
     assert f"{said}, and the robot file is for p3dx, p2d8, p2d8+" in message
     assert "\x1b" not in message
+    assert ("add its subclass" in message) == ("has other factors" in message) == bool(subclass)
+    assert ("may be others" in message) == ("set arcos.subclasses to []" in message) == (not subclass)
 
 
 def test_a_robot_says_more_of_itself_than_its_name() -> None:

@@ -40,8 +40,8 @@ SIGMAS = 4.0
 """An error is noise up to so many standard deviations."""
 
 
-def drawn(kind: str, seed: int) -> CalibrationDrive:
-    """A drive of a robot whose sensors are off by nothing, little or much, as are its scales."""
+def drawn(kind: str, seed: int, *, is_as_filed: bool = False) -> CalibrationDrive:
+    """A drive of a robot whose sensors are off by nothing, little or much, as are its scales; or all by nothing."""
     rng = np.random.default_rng([seed, 99])
     whole = calibration_drive(seed, "cone", 0.0, 60.0)
     nominal, places = whole.nominal, np.array(whole.nominal.mounts)
@@ -51,6 +51,8 @@ def drawn(kind: str, seed: int) -> CalibrationDrive:
     sensors = [s.model_copy(update={"x_m": x, "y_m": y, "angle_deg": angle}) for (x, y), angle, s in rows]
     true = nominal.model_copy(update={"sensors": tuple(sensors)})
     distance, turn, ranges = (1.0 + rng.choice([-1.0, 0.0, 1.0], 3) * (0.02, 0.02, 0.015)).tolist()
+    if is_as_filed:
+        true, distance, turn, ranges = nominal, 1.0, 1.0, 1.0
     model = ("cone", "specular")[seed % 2]
     acoustics = AcousticsConfig.model_validate(
         {
@@ -115,7 +117,16 @@ def test_a_calibrated_robot_is_no_worse_than_its_file(kind: str, has_way: bool, 
     assert found.shows_any or kind != "turn"
     assert not found.shows_any or kind != "stand"
     changed = (found.mounts != np.array(drive.nominal.mounts)).any() or any(scale != 1.0 for scale in found.scales)
-    assert found.has_gain >= changed
+    changed |= found.half_angle_rad != math.radians(drive.nominal.beam_half_angle_deg)
+    assert found.has_gain == changed
+
+
+def test_of_a_robot_that_is_as_its_file_says_nothing_is_changed() -> None:
+    drive = drawn("turn", 3, is_as_filed=True)
+    found = calibrate(drive.firings, drive.nominal, [DRUM.radius_m], None, synchro=False)
+    assert found is not None
+    assert found.shows_any
+    assert not found.has_gain
 
 
 def test_a_suitable_drive_still_improves() -> None:

@@ -130,7 +130,7 @@ def refuse_without_gain(file: str, found: Calibration, *, lag_is_new: bool) -> N
     UserError
         The drive shows nothing of the robot, or nothing that its file does not say.
     """
-    if not found.shows_any:
+    if not (found.shows_any or lag_is_new):
         raise UserError(
             f"{file}: the drive shows neither where the sensors are nor by how much odometry and ranges are wrong; "
             "nothing was written: turn slowly twice on the spot a metre from a bare wall, drive four metres past "

@@ -7,7 +7,7 @@ robot that stands cannot know by itself.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 from config.robot import RingConfig
@@ -45,8 +45,11 @@ class HandWatch:
         """The sensors that hear something as near as a hand, in all but one of `READINGS` at least."""
         return frozenset(i for i, near in enumerate(self._near) if near >= READINGS - 1 and self._free[i])
 
-    def take(self, ranges: Sequence[float]) -> int | None:
-        """Take the ranges of a firing; return the sensor that now hears a hand, None if none does."""
+    def take(self, ranges: Sequence[float], first: Collection[int] = ()) -> int | None:
+        """Take the ranges of a firing; return the sensor that now hears a hand, None if none does.
+
+        Where several do, it is one of `first` if it can be.
+        """
         for i, (range_m, before_m) in enumerate(zip(ranges, self._before, strict=True)):
             if math.isnan(range_m):
                 continue
@@ -54,7 +57,7 @@ class HandWatch:
             self._near[i] = self._near[i] + 1 if is_near else 0
             self._free[i] |= not is_near
         found = [i for i, near in enumerate(self._near) if near >= READINGS and self._free[i]]
-        return max(found, key=self._near.__getitem__, default=None)
+        return max(found, key=lambda i: (i in first, self._near[i]), default=None)
 
 
 def side_of(angle_rad: float) -> str:

@@ -22,7 +22,7 @@ from drivers.messages import Flags, Floats, Odometry, Twist
 from drivers.registry import line_options, make_driver
 from runtime.cli.commands.robots.crosstalk_trial import crosstalk
 from runtime.cli.commands.robots.hand_trial import HandWatch, judge_hands, side_of
-from runtime.cli.commands.robots.servo_trial import hands_before, judge_servo_hands, stuck_servos
+from runtime.cli.commands.robots.servo_trial import hands_before, judge_servo_hands, not_shown_by_hands, stuck_servos
 from runtime.cycle.connection import POLL_S, Connection
 
 SLACK_S: Final = 2.0
@@ -314,22 +314,22 @@ class RingTest:
         """Ask for a hand before each sensor, and write which of them does not answer in its place."""
         ring = self._config.ring
         watch = HandWatch([statistics.median(each) if each else math.inf for each in ranges])
-        hands = (
-            [hand.angle_rad for hand in hands_before(ring)] if ring.has_servo else [m.angle_rad for m in ring.mounts]
-        )
         answered, heard = list[int | None](), list[frozenset[int]]()
-        for angle_rad in hands:
+        for sensor, angle_rad in hands_before(ring):
+            # A sensor beside one on a servo may hear a hand sooner than the bearing that looks there.
+            own = {k for k, of in enumerate(ring.sensor_of) if of == sensor or not ring.has_servo}
             self._write(f"hold something flat 10 to 30 cm from the robot, {side_of(angle_rad)} …\n")
             sys.stdout.flush()
             watch.ask()
-            found, deadline_s = None, self._clock() + HAND_S
-            while found is None and self._clock() < deadline_s:
+            found, answering, deadline_s = None, frozenset[int](), self._clock() + HAND_S
+            while found not in own and self._clock() < deadline_s:
                 for reported in await self._exchange():
-                    found = watch.take(reported.tolist()) if found is None else found
+                    if found not in own and (now := watch.take(reported.tolist(), own)) is not None:
+                        found, answering = now, watch.answering
             answered.append(found)
-            heard.append(frozenset() if found is None else watch.answering)
+            heard.append(answering)
         wrong = judge_servo_hands(ring, heard) if ring.has_servo else judge_hands(ring, answered)
-        for line in wrong or ["each sensor answers in its place"]:
+        for line in [*(wrong or ["each sensor answers in its place"]), *not_shown_by_hands(ring)]:
             self._write(f"{line}\n")
         return not wrong
 

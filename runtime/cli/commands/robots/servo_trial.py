@@ -34,7 +34,9 @@ class HeldHand(NamedTuple):
 
 
 def hands_before(ring: RingConfig) -> tuple[HeldHand, ...]:
-    """Return where hands are held before a ring with servos: ahead of each sensor, and left of one on a servo."""
+    """Return where hands are held before a ring: ahead of each sensor, and left of one on a servo."""
+    if not ring.has_servo:
+        return tuple(HeldHand(i, mount.angle_rad) for i, mount in enumerate(ring.mounts))
     hands = []
     for i, sensor in enumerate(ring.sensors or ()):
         middle = math.radians(sensor.angle_deg)
@@ -79,11 +81,17 @@ def judge_servo_hands(ring: RingConfig, heard: Sequence[Collection[int]]) -> lis
     hands, of = hands_before(ring), ring.sensor_of
     lines = []
     for i, sensor in enumerate(ring.sensors or ()):
-        own = [(hand.angle_rad, which) for hand, which in zip(hands, heard, strict=True) if hand.sensor == i]
-        others = sorted({of[k] for _, which in own for k in which} - {i})
-        if others:
+        all_heard = [(hand.angle_rad, which) for hand, which in zip(hands, heard, strict=True) if hand.sensor == i]
+        own = [(angle, [k for k in which if of[k] == i]) for angle, which in all_heard]
+        exchanged = [
+            (angle, others[0])
+            for (angle, which), (_, mine) in zip(all_heard, own, strict=True)
+            if not mine and (others := _strangers(ring, which, angle))
+        ]
+        if exchanged:
+            angle, other = exchanged[0]
             lines.append(
-                f"EXCHANGED: a hand {side_of(own[0][0])} is heard by sensor {others[0]}, and sensor {i} belongs "
+                f"EXCHANGED: a hand {side_of(angle)} is heard by sensor {other}, and sensor {i} belongs "
                 f"there: exchange their wires, or correct the order of SENSORS or of ring.sensors"
             )
         elif not any(which for _, which in own):
@@ -91,6 +99,31 @@ def judge_servo_hands(ring: RingConfig, heard: Sequence[Collection[int]]) -> lis
         elif sensor.servo and (wrong := _wrong_servo(ring, i, own)) is not None:
             lines.append(wrong)
     return lines
+
+
+def not_shown_by_hands(ring: RingConfig) -> list[str]:
+    """Return what two hands do not show of servos whose sweep is narrow, a line each."""
+    lines = []
+    for i, sensor in enumerate(ring.sensors or ()):
+        bearings = [k for k, of in enumerate(ring.sensor_of) if of == i]
+        turn = _side_rad(sensor)
+        hidden = [
+            *(["whether its servo turns"] if turn < OFF_RAD and not _is_wide(ring, bearings, len(bearings)) else []),
+            *(["to which side it turns"] if 2.0 * turn < OFF_RAD else []),
+        ]
+        if sensor.servo and hidden:
+            lines.append(
+                f"sensor {i}: in its sweep of {sensor.sweep_deg:g} degrees, two hands do not show "
+                f"{' or '.join(hidden)}: watch it turn"
+            )
+    return lines
+
+
+def _strangers(ring: RingConfig, which: Collection[int], angle_rad: float) -> list[int]:
+    """Return which sensors hear a hand although none of their bearings that hear it has it in its beam."""
+    of, reach = ring.sensor_of, math.radians(ring.beam_half_angle_deg)
+    near = {of[k] for k in which if abs(math.remainder(ring.mounts[k].angle_rad - angle_rad, math.tau)) <= reach}
+    return sorted({of[k] for k in which} - near)
 
 
 def _wrong_servo(ring: RingConfig, sensor: int, own: Sequence[tuple[float, Collection[int]]]) -> str | None:

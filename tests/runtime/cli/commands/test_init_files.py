@@ -119,6 +119,19 @@ def test_a_wrong_option_writes_nothing(words: tuple[str, ...], said: str, capsys
     assert list(Path().iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("words", "answers"),
+    [(("model", "--radius", "1"), "\nbox\n"), (("world", "--drum-radius", "0.3"), "\n\n0\n")],
+)
+def test_an_option_without_meaning_is_refused_before_more_is_asked(
+    words: tuple[str, ...], answers: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kind, *options = words
+    monkeypatch.setattr("sys.stdin", Person(answers))
+    assert run_command(["init", kind, "mine.toml", *options]) == WRONG_CALL
+    assert f"{options[0]}: no meaning" in capsys.readouterr().err
+
+
 def test_what_no_option_gives_is_asked_for_on_a_terminal(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -6,12 +6,17 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tomli_w
 
-from config.errors import DONE, FAILED, WRONG_CALL
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_robot
+from perception.calibration.calibrate import Calibration
+from perception.calibration.drive import Scales
+from perception.calibration.geometry_fit import RangeNoise
 from runtime.cli.app import run_command
+from runtime.cli.commands.robots.calibrate import refuse_without_gain
 from runtime.recording.ring_log_rows import write_ring_log
 from tests.calibration_drive import DRUM, CalibrationDrive, calibration_drive
 
@@ -67,6 +72,32 @@ def test_a_drive_that_shows_nothing_writes_nothing(
     assert run_command(call) == FAILED
     assert "nothing was written" in capsys.readouterr().err
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("shows", "gains", "lag_is_new", "said"),
+    [
+        (False, False, False, "the drive shows neither"),
+        (True, False, False, "the robot is as its file says"),
+        (True, True, False, None),
+        (True, False, True, None),
+        (False, False, True, None),
+    ],
+)
+def test_a_drive_that_says_no_more_than_the_file_is_refused(
+    shows: bool, gains: bool, lag_is_new: bool, said: str | None
+) -> None:
+    unknown = Scales(math.inf, math.inf, math.inf)
+    place_sigmas, angle_sigmas = np.array([0.01 if shows else math.inf]), np.array([math.inf])
+    found = Calibration(
+        np.zeros((1, 3)), place_sigmas, angle_sigmas, np.array([9]), 0.2, everything_echoes=False, scales=Scales(),
+        scale_sigmas=unknown, noise=RangeNoise(0.01, 0.0), walls=1, drums=0, has_gain=gains,
+    )  # fmt: skip
+    if said is None:
+        refuse_without_gain("drive.csv", found, lag_is_new=lag_is_new)
+        return
+    with pytest.raises(UserError, match=said):
+        refuse_without_gain("drive.csv", found, lag_is_new=lag_is_new)
 
 
 def test_calls_that_are_refused(hall_log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
