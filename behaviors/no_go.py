@@ -128,9 +128,8 @@ def speed_limit_m_s(zones: Zones, x: float, y: float, radius_m: float) -> float:
 
     The margin of `MARGIN_M` counts as part of the body.
     """
-    here, reach_m = np.array((x, y)), radius_m + MARGIN_M
-    near = (zone for zone in zones.speed if zone.is_near(x, y, reach_m))
-    return min((zone.speed_max_m_s for zone in near if float(zone.distances_m(here)) < reach_m), default=math.inf)
+    near = _within(zones.speed, np.array((x, y)), radius_m + MARGIN_M)
+    return min((zone.speed_max_m_s for zone in near), default=math.inf)
 
 
 def limited(

@@ -109,9 +109,9 @@ def place_errors(found: Followed, odometry: Floats, truth: Floats) -> Row:
     path = found.path()
     at_end = errors_when_aligned(path[:, :2], truth[:, :2])
     return {
-        "odometry": _rms(errors_when_aligned(odometry[:, :2], truth[:, :2])),
-        "now": _rms(errors_when_aligned(said, truth[:, :2])),
-        "end": _rms(at_end),
+        "odometry": rms(errors_when_aligned(odometry[:, :2], truth[:, :2])),
+        "now": rms(errors_when_aligned(said, truth[:, :2])),
+        "end": rms(at_end),
         "worst": float(at_end.max()),
         "odometry over 3 m": _over_way(odometry, truth),
         "over 3 m": _over_way(path, truth),
@@ -137,8 +137,9 @@ def _over_way(poses: Floats, truth: Floats) -> float:
     for at in (poses, truth):
         (dx, dy), c, s = (at[later, :2] - at[first, :2]).T, np.cos(at[first, 2]), np.sin(at[first, 2])
         moved.append(np.column_stack([c * dx + s * dy, c * dy - s * dx]))
-    return _rms(np.hypot(*(moved[0] - moved[1]).T)) if len(first) else 0.0
+    return rms(np.hypot(*(moved[0] - moved[1]).T)) if len(first) else 0.0
 
 
-def _rms(errors: Floats) -> float:
+def rms(errors: Floats) -> float:
+    """Return the root mean square of errors."""
     return float(np.sqrt((errors**2).mean()))

@@ -20,7 +20,7 @@ from bench.building_places import FIRING_S, drive
 from bench.correction import Wall, unmatched
 from bench.correction_drives import CorrectionDrive, correction_drive, level_name, room_of
 from bench.laser_rooms import RING
-from bench.real_places import WRONG_M, WRONG_SIGMAS, Followed, followed, place_errors
+from bench.real_places import Followed, followed, place_errors, rms
 from bench.real_rooms import Row
 from bench.trials.known_room_trials import drifting_odometry
 from config.load import load_settings
@@ -128,16 +128,13 @@ def _in_corridor(found: Followed, odometry: Floats, truth: Floats) -> Row:
     spreads = turn.T @ np.array([here.covariance[:2, :2] for here in found.now]) @ turn
     along, across = (said - truth[:, :2]).T
     by_odometry = odometry[:, :2] @ turn + (to.x, to.y) - truth[:, :2]
-    off = np.hypot(along, across)
-    sigma = np.sqrt(spreads[:, 0, 0] + spreads[:, 1, 1])
-    tracking = np.array([here.status == "tracking" for here in found.now])
     return {
-        "odometry across": _rms(by_odometry[:, 1]), "odometry along": _rms(by_odometry[:, 0]),
-        "across": _rms(across), "along": _rms(along),
+        "odometry across": rms(by_odometry[:, 1]), "odometry along": rms(by_odometry[:, 0]),
+        "across": rms(across), "along": rms(along),
         "across at the end": float(abs(across[-1])), "along at the end": float(abs(along[-1])),
         "across within 95 %": float((across**2 <= CHI2_95_ONE * spreads[:, 1, 1]).mean()),
         "along within 95 %": float((along**2 <= CHI2_95_ONE * spreads[:, 0, 0]).mean()),
-        "wrong": float((tracking & (off > np.maximum(WRONG_M, WRONG_SIGMAS * sigma))).mean()),
+        "wrong": place_errors(found, odometry, truth)["wrong"],
     }  # fmt: skip
 
 
@@ -237,8 +234,8 @@ def measure_long(kilometres: float, seed: int, tell: Callable[[str], None]) -> d
             "longest ms": max(took_ms), "ratio": last / first,
             "quantum p99 ms": float(np.quantile(quanta_ms, 0.99)), "longest quantum ms": max(quanta_ms),
             "quanta a map": len(quanta_ms) / max(graph.count, 1),
-            "odometry": _rms(errors_when_aligned(moved, truth[:, :2])),
-            "now": _rms(errors_when_aligned(np.array(said), truth[:, :2])),
+            "odometry": rms(errors_when_aligned(moved, truth[:, :2])),
+            "now": rms(errors_when_aligned(np.array(said), truth[:, :2])),
         }
     }  # fmt: skip
 
@@ -249,7 +246,3 @@ def _sonar_near(world: WorldConfig, part: int, rng: np.random.Generator) -> Sona
     walls = tuple(w for w in world.wall if max(w.x1_m, w.x2_m) > low and min(w.x1_m, w.x2_m) < high)
     near = world.model_copy(update={"wall": walls})
     return Sonar(RING, compile_scene(near), near.acoustics, rng)
-
-
-def _rms(errors: Floats) -> float:
-    return float(np.sqrt((errors**2).mean()))

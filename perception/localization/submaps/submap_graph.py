@@ -86,7 +86,7 @@ class SubmapGraph:
         Whether matches have refuted odometry, so that poses are corrected.
     """
 
-    SCRATCH: Final = ("_grids", "_job", "_way")
+    SCRATCH: Final = ("_grids", "_job", "_ended_way", "_way")
     BOUNDS: Final = bounds(
         _mounts=CONSTANT,
         _half_angle=CONSTANT,
@@ -123,8 +123,9 @@ class SubmapGraph:
         self._submaps, self._nodes, self._links = Rows(Submap), Rows(Node), Rows(Link)
         self._grids: dict[int, Floats] = {}
         self._job: Iterator[Outcome | None] | None = None
-        self._way: tuple[tuple[int, int], int, KnownWay, KnownWay] | None = None
-        """Maps compared and held, poses of the map that goes on, and the known way until it and with it."""
+        self._ended_way: tuple[tuple[int, ...], KnownWay] | None = None
+        self._way: tuple[tuple[int, ...], KnownWay] | None = None
+        """The known way until the last map ended, and with the map that goes on, each beside what it follows from."""
         self._readings[:] = self._trail[:] = 0.0
         self.held.reset()
         self._latest = np.full((len(self._mounts), 3), math.inf)
@@ -275,7 +276,7 @@ class SubmapGraph:
 
     def drop_caches(self) -> None:
         """Forget what follows from the rest, after a snapshot was put back."""
-        self._grids, self._job, self._way = {}, None, None
+        self._grids, self._job, self._ended_way, self._way = {}, None, None, None
 
     def moment(self) -> Moment:
         """Return the moment of the last firing, for `placed`."""
@@ -299,15 +300,14 @@ class SubmapGraph:
 
         It is the same object until some poses more are known, or a map.
         """
-        state, poses = (self._matched, self.count), self._trail_count // WAY_POSES
+        maps = self._matched, self.count
+        if self._ended_way is None or self._ended_way[0] != maps:
+            self._ended_way = maps, self._way_of_maps()
+        state, ended = (*maps, self._trail_count // WAY_POSES), self._ended_way[1]
         if self._way is None or self._way[0] != state:
-            self._way = state, -1, (of_maps := self._way_of_maps()), of_maps
-        _, known, of_maps, whole = self._way
-        if known != poses:
             here = self._placed(self.count, self._trail[: self._trail_count, :3])
-            whole = of_maps._replace(path=np.concatenate([of_maps.path, here[:, :2]]))
-            self._way = state, poses, of_maps, whole
-        return whole
+            self._way = state, ended._replace(path=np.concatenate([ended.path, here[:, :2]]))
+        return self._way[1]
 
     def _way_of_maps(self) -> KnownWay:
         """Return the way until the last map ended: its cost grows with the way, so it is asked for once a map."""

@@ -240,6 +240,6 @@ def _write(file: str, text: str, *, force: bool) -> int:
         draft.unlink(missing_ok=True)
     for note in notes:
         sys.stdout.write(f"{file}: {note}\n")
-    path = file if file.endswith(".toml") or "/" in file else f"./{file}"  # or it is taken for a shipped name
+    path = file if names_a_path(file) else f"./{file}"  # or it is taken for a shipped name
     sys.stdout.write(f"{file}: written; look at it, then: echolocate check {path}\n")
     return DONE

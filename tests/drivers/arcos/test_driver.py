@@ -328,24 +328,6 @@ def test_ranges_become_firings_with_times_and_poses(harness: Harness) -> None:
     assert harness.driver.firings_waiting == 0
 
 
-def test_a_robot_with_none_of_the_files_sonars_is_named_once(harness: Harness) -> None:
-    """Its ranges were dropped, and the ring's power and cable blamed."""
-    harness.ready()
-
-    def report(*discs: int) -> tuple[str | None, int]:
-        for disc in discs:
-            harness.controller.readings = (SonarReading(disc, 1000),)
-            harness.run(0.1)
-        return harness.driver.problem, sum("none of those that" in note for note in harness.notes)
-
-    assert report(16, 17, 18, 3, 16, 17, 18, 19) == (None, 0), "a few are of a sequence before the file's"
-    said, notes = report(20, 21)
-    assert "file lists, 0, 1, 2, 3," in (said or "")
-    assert notes == 1
-    assert report(3) == (None, 1)
-    assert report(*range(16, 26))[1] == 1
-
-
 def test_a_new_pattern_is_sent_and_an_impossible_one_refused(harness: Harness) -> None:
     harness.ready()
     ring = P3DX_FILE.ring.model_copy(update={"firing": FiringConfig(sets=((0, 8), (4, 12)), step_period_s=0.05)})

@@ -273,3 +273,22 @@ def test_the_stop_button_with_its_line_engaged_is_a_latch() -> None:
     harness.controller.flags = SipFlags.E_STALL
     harness.run(0.2)
     assert Flags.LATCHED in harness.flags
+
+
+def test_a_robot_with_none_of_the_files_sonars_is_named_once() -> None:
+    """Its ranges were dropped, and the ring's power and cable blamed."""
+    harness = Harness()
+    harness.ready()
+
+    def report(*discs: int) -> tuple[str | None, int]:
+        for disc in discs:
+            harness.controller.readings = (SonarReading(disc, 1000),)
+            harness.run(0.1)
+        return harness.driver.problem, sum("none of those that" in note for note in harness.notes)
+
+    assert report(16, 17, 18, 3, 16, 17, 18, 19) == (None, 0), "a few are of a sequence before the file's"
+    said, notes = report(20, 21)
+    assert "file lists, 0, 1, 2, 3," in (said or "")
+    assert notes == 1
+    assert report(3) == (None, 1)
+    assert report(*range(16, 26))[1] == 1

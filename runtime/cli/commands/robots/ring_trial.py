@@ -111,11 +111,11 @@ def judge_sensor(ranges: list[float], rounds: int, ring: RingConfig, unsteadines
     """
     heard = sorted(value for value in ranges if math.isfinite(value))
     if not ranges:
-        text = (
-            "NO ANSWER within its window: check its supply, and its trigger and echo wires; hold something flat in "
+        return Finding(
+            is_good=False,
+            text="NO ANSWER within its window: check its supply, and its trigger and echo wires; hold something flat "
+            "in front of it: if it answers then, it must report no echo where it hears nothing, and not its maximum",
         )
-        text += "front of it: if it answers then, it must report no echo where it hears nothing, and not its maximum"
-        return Finding(is_good=False, text=text)
     if len(ranges) < ANSWERS_MIN * rounds:
         return Finding(is_good=False, text=f"answers {len(ranges)} times of {rounds}: check for a loose wire")
     if not heard:

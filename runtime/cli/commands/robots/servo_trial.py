@@ -58,7 +58,7 @@ def stuck_servos(ring: RingConfig, medians: Sequence[float]) -> dict[int, str]:
     """
     found, step_m = {}, ONE_RANGE_STEPS * max(ring.resolution_m, FINE_M)
     for i, sensor in enumerate(ring.sensors or ()):
-        bearings = [k for k, of in enumerate(ring.sensor_of) if of == i]
+        bearings = _bearings(ring, i)
         heard = [medians[k] for k in bearings if math.isfinite(medians[k])]
         if sensor.servo and _is_wide(ring, bearings, len(heard)) and max(heard) - min(heard) <= step_m:
             found[i] = (
@@ -81,17 +81,13 @@ def judge_servo_hands(ring: RingConfig, heard: Sequence[Collection[int]]) -> lis
     hands, of = hands_before(ring), ring.sensor_of
     lines = []
     for i, sensor in enumerate(ring.sensors or ()):
-        all_heard = [(hand.angle_rad, which) for hand, which in zip(hands, heard, strict=True) if hand.sensor == i]
-        own = [(angle, [k for k in which if of[k] == i]) for angle, which in all_heard]
-        exchanged = [
-            (angle, others[0])
-            for (angle, which), (_, mine) in zip(all_heard, own, strict=True)
-            if not mine and (others := _strangers(ring, which, angle))
-        ]
-        if exchanged:
-            angle, other = exchanged[0]
+        by_hand = [(hand.angle_rad, which) for hand, which in zip(hands, heard, strict=True) if hand.sensor == i]
+        own = [(angle, [k for k in which if of[k] == i]) for angle, which in by_hand]
+        missed = (hand for hand, (_, mine) in zip(by_hand, own, strict=True) if not mine)
+        exchanged = ((angle, other) for angle, which in missed for other in _strangers(ring, which, angle))
+        if (one := next(exchanged, None)) is not None:
             lines.append(
-                f"EXCHANGED: a hand {side_of(angle)} is heard by sensor {other}, and sensor {i} belongs "
+                f"EXCHANGED: a hand {side_of(one[0])} is heard by sensor {one[1]}, and sensor {i} belongs "
                 f"there: exchange their wires, or correct the order of SENSORS or of ring.sensors"
             )
         elif not any(which for _, which in own):
@@ -105,7 +101,7 @@ def not_shown_by_hands(ring: RingConfig) -> list[str]:
     """Return what two hands do not show of servos whose sweep is narrow, a line each."""
     lines = []
     for i, sensor in enumerate(ring.sensors or ()):
-        bearings = [k for k, of in enumerate(ring.sensor_of) if of == i]
+        bearings = _bearings(ring, i)
         turn = _side_rad(sensor)
         hidden = [
             *(["whether its servo turns"] if turn < OFF_RAD and not _is_wide(ring, bearings, len(bearings)) else []),
@@ -128,7 +124,7 @@ def _strangers(ring: RingConfig, which: Collection[int], angle_rad: float) -> li
 
 def _wrong_servo(ring: RingConfig, sensor: int, own: Sequence[tuple[float, Collection[int]]]) -> str | None:
     """Return what is wrong with the servo of a sensor that hears; None if it looks where it should."""
-    mounts, bearings = ring.mounts, [k for k, of in enumerate(ring.sensor_of) if of == sensor]
+    mounts, bearings = ring.mounts, _bearings(ring, sensor)
     if any(_is_wide(ring, bearings, len(which)) for _, which in own):
         return (
             f"sensor {sensor} DOES NOT TURN: it hears a hand whichever way its servo should look: check the servo's "
@@ -160,6 +156,11 @@ def _wrong_servo(ring: RingConfig, sensor: int, own: Sequence[tuple[float, Colle
         f"sensor {sensor}: a hand {side_of(own[0][0])} is heard {degrees:.0f} degrees and one {side_of(own[1][0])} "
         f"{abs(math.degrees(side)):.0f} degrees away from there: correct its two pulses in SERVOS"
     )
+
+
+def _bearings(ring: RingConfig, sensor: int) -> list[int]:
+    """Return the mounts of a sensor, one for each bearing of its servo."""
+    return [k for k, of in enumerate(ring.sensor_of) if of == sensor]
 
 
 def _side_rad(sensor: SensorConfig) -> float:
