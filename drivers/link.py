@@ -79,7 +79,7 @@ class Link:
         self._on_opened = on_opened
         self._on_data = on_data
         self._on_closed = on_closed
-        self._opener = opener
+        self.opener = opener
         self._open_timeout_s = open_timeout_s
         self._line: _Connection | None = None
         self._last_error: str | None = None
@@ -158,7 +158,7 @@ class Link:
         if self._line is not None:
             return
         try:
-            port = await open_off_loop(self._config, self._opener, self._open_timeout_s)
+            port = await open_off_loop(self._config, self.opener, self._open_timeout_s)
             line = _Connection(self, port)
         except LinkError as e:
             self._last_error = str(e)

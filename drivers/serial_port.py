@@ -12,6 +12,7 @@ import socket
 import termios
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import TypeAlias
 
 import serial
@@ -43,6 +44,11 @@ def open_port(config: LinkConfig) -> Port:
     if config.port is not None and is_tcp(config.port):
         return TcpPort(config.port)
     return serial.Serial(config.port, config.baud, exclusive=True, timeout=0, write_timeout=0)
+
+
+def is_missing(config: LinkConfig) -> bool:
+    """Return whether there is no such serial port, as when the robot is not plugged in."""
+    return config.port is not None and not is_tcp(config.port) and not Path(config.port).exists()
 
 
 _IN_USE = (errno.EAGAIN, errno.EBUSY, errno.EWOULDBLOCK)

@@ -12,6 +12,7 @@ from drivers.base_model import stop_s
 from drivers.driver import LineState, RobotDriver
 from drivers.link import Link
 from drivers.messages import Flags
+from drivers.serial_port import LinkError, is_missing, open_port
 from runtime.cycle.line_messages import ROBOT_LINE, LineMessages
 from runtime.cycle.step import STANDSTILL
 
@@ -20,6 +21,9 @@ CONNECT_MAX_S: Final = 5.0
 
 ANSWER_TIMEOUT_S: Final = 2.0
 """Least wait, s, also where the driver gave up earlier: a robot may be starting, or its emulator kept waiting."""
+
+UNCONFIRMED_END: Final = "the base did not confirm the halt; if it moves, stop it by its emergency switch"
+"""Said at the end of a run."""
 
 POLL_S: Final = 0.005
 """Period of the line's exchanges while no cycle runs, s."""
@@ -48,7 +52,8 @@ class Connection(NamedTuple):
             The robot does not answer, or answers with errors.
         """
         link, driver = self.link, self.driver
-        await link.open_once()
+        if not is_stopping():
+            await self._open()
         begin_run_s = self.clock()
         while driver.state is not LineState.READY and not is_stopping():
             run_s = self.clock()
@@ -63,6 +68,20 @@ class Connection(NamedTuple):
                 await link.stop()
                 raise UserError(reason or text, FAILED)
             await asyncio.sleep(POLL_S)
+
+    @property
+    def is_missing(self) -> bool:
+        """Whether there is no such port, so that `connect` fails at once."""
+        return self.link.opener is open_port and is_missing(self.link.config)
+
+    async def _open(self) -> None:
+        try:
+            await self.link.open_once()
+        except LinkError as error:
+            text = self.line_messages.problem(LineState.CLOSED, str(error))
+            if text in (None, str(error)):
+                raise
+            raise LinkError(text, FAILED) from error
 
     async def shut_down(self) -> bool:
         """Halt the base and end the session; return whether the base confirmed that it stopped."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, Protocol
 
 from config.settings import Settings
@@ -19,6 +19,9 @@ from runtime.cycle.step import State
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
+
+POLL_S: Final = 0.2
+"""Time between two looks at whether the start still has a use, s."""
 
 PROGRESS_PERIOD_S: Final = 5.0
 """Time between two lines of the log on how far the preparation is, s."""
@@ -42,6 +45,17 @@ class Preparation(Protocol):
         """Return when recognition with these settings can run without compiling anything."""
 
 
+class Connects(Protocol):
+    """Connects to the robot; see `runtime.cycle.connection`."""
+
+    @property
+    def is_missing(self) -> bool:
+        """Whether there is no such port, so that `connect` fails at once."""
+
+    async def connect(self, is_stopping: Callable[[], bool]) -> None:
+        """Return when the robot is ready, or the run is ending; raise a UserError if it does not answer."""
+
+
 def fresh_state(settings: Settings, *, recognises: bool = True) -> State:
     """Return the state in which a run starts: one that recognises, or one whose recognition is not ready."""
     return State(
@@ -61,24 +75,45 @@ class RunningPreparation:
         Gets the progress now and then.
     on_ready : callable
         Called once recognition is ready, between two cycles: it takes milliseconds.
+    on_starting : callable, optional
+        Gets the progress before the first cycle.
     """
 
     def __init__(
-        self, preparation: Preparation | None, log: FilteringBoundLogger, on_ready: Callable[[], None]
+        self,
+        preparation: Preparation | None,
+        log: FilteringBoundLogger,
+        on_ready: Callable[[], None],
+        on_starting: Callable[[str], None] | None = None,
     ) -> None:
         self._preparation = preparation
         self._log = log
         self._on_ready = on_ready
+        self._on_starting = on_starting
         self._task: asyncio.Task[None] | None = None
         self._logged_run_s = -math.inf
 
-    async def start(self, settings: Settings, connect: Callable[[], Awaitable[None]]) -> None:
-        """Prepare what the first cycle needs and connect; go on to prepare recognition beside that and the cycles."""
+    async def start(self, settings: Settings, connection: Connects, is_stopping: Callable[[], bool]) -> None:
+        """Prepare what the first cycle needs and connect; go on to prepare recognition beside that and the cycles.
+
+        Parameters
+        ----------
+        settings : Settings
+            Of the run.
+        connection : Connects
+            Connects to the robot, before everything is prepared if that will fail.
+        is_stopping : callable
+            Whether the run is ending.
+        """
         if self._preparation is not None:
-            await self._preparation.ring(settings)
+            is_connected = await self._prepare_ring(self._preparation, settings, connection, is_stopping)
+            if is_stopping():
+                return
             self._task = asyncio.create_task(self._prepare(self._preparation, settings), name="preparation")
+            if is_connected:
+                return
         try:
-            await connect()
+            await connection.connect(is_stopping)
         except BaseException:  # nothing else would end it
             await self.close()
             raise
@@ -110,6 +145,30 @@ class RunningPreparation:
             self._logged_run_s = run_s
             self._log.info(progress)
         return progress
+
+    async def _prepare_ring(
+        self, preparation: Preparation, settings: Settings, connection: Connects, is_stopping: Callable[[], bool]
+    ) -> bool:
+        """Wait until the ring can be heard, and say now and then how far that is; return whether it is connected."""
+        ring, is_connected = asyncio.ensure_future(preparation.ring(settings)), False
+        begin_s = said_s = asyncio.get_running_loop().time()
+        try:
+            while not is_stopping() and not (await asyncio.wait([ring], timeout=POLL_S))[0]:
+                if connection.is_missing and not is_connected:
+                    await connection.connect(is_stopping)  # says why that fails
+                    is_connected = True
+                now_s = asyncio.get_running_loop().time()
+                if now_s - said_s >= PROGRESS_PERIOD_S:
+                    said_s, so_far = now_s, f"{now_s - begin_s:.0f} s so far"
+                    text = f"{preparation.progress}; the robot is connected after that ({so_far})"
+                    self._log.info(text)
+                    if self._on_starting is not None:
+                        self._on_starting(text)
+            if ring.done():
+                ring.result()
+        finally:
+            ring.cancel()
+        return is_connected
 
     async def _prepare(self, preparation: Preparation, settings: Settings) -> None:
         await preparation(settings)

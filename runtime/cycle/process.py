@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from config.errors import UserError
 from config.settings import Settings
-from drivers.driver import RobotDriver
+from drivers.driver import LineState, RobotDriver
 from drivers.line_budget import FLOOD_HOLD_S, ReceiveBudget
 from drivers.link import Link
 from drivers.messages import Firing, Twist
 from drivers.registry import line_options, make_driver
 from perception.edits import Edit, Evidence
 from runtime.cycle.callbacks import CALLBACKS, COLLECTION, LINE_LOST, LINE_OPENED, LINE_SEND, LINK_RECEIVE
-from runtime.cycle.connection import Connection
+from runtime.cycle.connection import UNCONFIRMED_END, Connection
 from runtime.cycle.drive_inputs import DriveInputs
 from runtime.cycle.drive_requests import DriveInput
 from runtime.cycle.inputs import Inputs, OperatorInput, Request, always_valid, command_gap_max_s, gather_inputs
@@ -76,6 +76,8 @@ class Observers:
     """Gets the direction, the moment by the run's clock and by the host's, and the bytes that went over the line."""
     on_settings: Callable[[Settings], None] | None = None
     """Gets settings that changed while the robot runs, before the first cycle under them."""
+    on_starting: Callable[[str], None] | None = None
+    """Gets how far the start is, now and then before the first cycle."""
 
 
 class RobotProcess:
@@ -126,7 +128,7 @@ class RobotProcess:
         self._notifier = SdNotifier() if notifier is None else notifier
         self.health = Health(log)
         self._driver = make_driver(settings)
-        self._preparation = RunningPreparation(preparation, log, self._on_prepared)
+        self._preparation = RunningPreparation(preparation, log, self._on_prepared, observers.on_starting)
         self._state = fresh_state(settings, recognises=preparation is None)
         self._scheduler = CycleScheduler(settings, self._clock, CALLBACKS)
         timed = self.timing_monitor.timed
@@ -217,9 +219,10 @@ class RobotProcess:
             The port cannot be opened, or the robot does not answer as it should.
         """
         with self.health.catching_unhandled_errors():
-            await self._preparation.start(self._settings, lambda: self._connection.connect(self._stop.is_set))
-            self._is_connected = True
-            self._log.info("robot ready", port=self._settings.link.port, robot=self.name)
+            await self._preparation.start(self._settings, self._connection, self._stop.is_set)
+            self._is_connected = self._driver.state is LineState.READY
+            if self._is_connected:  # else the run was ended before
+                self._log.info("robot ready", port=self._settings.link.port, robot=self.name)
             link_task = asyncio.create_task(self._link.run(), name="link")
             self.health.watch_task("link", link_task)
             try:
@@ -391,8 +394,7 @@ class RobotProcess:
         self._clock.release()
         self.health.begin_shutdown()
         self._notifier.stopping()
-        if not await self._connection.shut_down():
-            unconfirmed = "the base did not confirm the halt; if it moves, stop it by its emergency switch"
-            self._log.warning(self._line_messages.message(unconfirmed))
+        if not await self._connection.shut_down() and self._is_connected:
+            self._log.warning(self._line_messages.message(UNCONFIRMED_END))
         link_task.cancel()
         await asyncio.gather(link_task, return_exceptions=True)

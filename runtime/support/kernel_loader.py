@@ -37,7 +37,7 @@ from runtime.support.kernel_cache import (
     uncompiled_parts,
     use_kernel_cache,
 )
-from runtime.support.kernel_warmup import compile_parts, warm_up
+from runtime.support.kernel_warmup import CompilationEnded, compile_parts, following_kernels, warm_up
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
@@ -51,6 +51,7 @@ WARM_UP: Final = "runtime.support.kernel_warmup"
 
 KERNEL_COUNTS: Final = MappingProxyType(
     {
+        RING: 82,
         BAYES: 254,
         POLYGONS: 66,
         PAPER: 7,
@@ -73,6 +74,7 @@ COUNT_PERIOD_S: Final = 0.5
 """Time between two looks at how many kernels are compiled."""
 
 PREPARING: Final = "recognition is being prepared"
+RING_WAIT: Final = "the kernels that driving needs are being prepared"
 FIRST_START: Final = (
     "the kernels that driving needs are being compiled, once for this version: that takes some seconds"
 )
@@ -163,20 +165,36 @@ class KernelPreparation:
         self._expected = sum(KERNEL_COUNTS[part] for part in self._parts)
         self._host_clock = host_clock
         self._begin_host_s = host_clock()
-        self.progress = PREPARING
         self.first_start = FIRST_START if uncompiled_parts(self._folder, [RING]) else None
+        self.progress = f"{RING_WAIT}: they are being loaded" if self.first_start is None else RING_WAIT
         self._process: asyncio.subprocess.Process | None = None
         self._output: asyncio.Task[tuple[bytes, bytes]] | None = None
         """Reads what the process writes: behind a full pipe it would wait for ever."""
         self._ring: asyncio.Task[None] | None = None
+        self._is_closed = False
         self.is_over = asyncio.Event()
 
     def begin_ring(self, settings: Settings) -> asyncio.Task[None]:
         """Begin to load what `ring` waits for, and return the task; it is started only once."""
         if self._ring is None:
-            loading = asyncio.to_thread(compile_parts, settings, self._folder, [RING])
+            loading = asyncio.to_thread(self._compile_ring, settings)
             self._ring = asyncio.create_task(loading, name="kernels of the ring")
         return self._ring
+
+    def _compile_ring(self, settings: Settings) -> None:
+        """Compile the ring's kernels, unless the run ends meanwhile, and count them."""
+        try:
+            with following_kernels(self._on_ring_kernel):
+                compile_parts(settings, self._folder, [RING])
+        except Exception:
+            if not self._is_closed:  # numba may have put an error of its own in the place of `CompilationEnded`
+                raise
+
+    def _on_ring_kernel(self, compiled: int) -> None:
+        if self._is_closed:
+            raise CompilationEnded
+        elapsed_s = self._host_clock() - self._begin_host_s
+        self.progress = progress_text(compiled, KERNEL_COUNTS[RING], elapsed_s, RING_WAIT)
 
     async def ring(self, settings: Settings) -> None:
         """Return when the robot can drive: the kernels that keep and check the ring's echoes are loaded.
@@ -184,6 +202,7 @@ class KernelPreparation:
         They are few, so this process compiles them itself, where they never were.
         """
         await self.begin_ring(settings)
+        self.progress = PREPARING
 
     async def __call__(self, settings: Settings) -> None:
         """Return when no kernel of the other parts is left to compile or to load.
@@ -220,6 +239,7 @@ class KernelPreparation:
 
     async def close(self) -> None:
         """End a compilation in progress; the next start continues from there."""
+        self._is_closed = True
         if self._process is not None and self._output is not None:
             await kill_child(self._process)
             await asyncio.wait([self._output])
@@ -230,7 +250,7 @@ def begin_preparation(settings: Settings) -> KernelPreparation | None:
     return None if is_interpreted() else KernelPreparation(needed_parts(settings))
 
 
-def progress_text(done: int, expected: int, elapsed_s: float) -> str:
+def progress_text(done: int, expected: int, elapsed_s: float, what: str = PREPARING) -> str:
     """Return how far compiling is, for the operator.
 
     Parameters
@@ -239,8 +259,10 @@ def progress_text(done: int, expected: int, elapsed_s: float) -> str:
         Kernels compiled, of how many.
     elapsed_s : float
         Since the start, s.
+    what : str
+        What is being compiled.
     """
-    text = f"{PREPARING}: {done} of {expected} kernels"
+    text = f"{what}: {done} of {expected} kernels"
     if done >= expected or done < expected * SHARE_MIN:
         return text
     return f"{text}, about {max(1.0, elapsed_s * (expected - done) / done):.0f} s left"

@@ -13,6 +13,7 @@ import gc
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
@@ -247,7 +248,7 @@ def marking_compiled_kernels(folder: Path) -> Iterator[None]:
     from numba.core import event
 
     class Marker(event.Listener):  # type: ignore[misc]  # numba has no types
-        def on_start(self, started: event.Event) -> None:
+        def on_start(self, _started: event.Event) -> None:
             pass
 
         def on_end(self, ended: event.Event) -> None:
@@ -256,6 +257,30 @@ def marking_compiled_kernels(folder: Path) -> Iterator[None]:
                 (folder / f"{kernel.__module__}.{kernel.__name__}{COMPILED_SUFFIX}").touch()
 
     with event.install_listener("numba:compile", Marker()):
+        yield
+
+
+class CompilationEnded(Exception):  # noqa: N818 - no error: what needs the kernels has ended
+    """Raised by a function of `following_kernels` to compile no further kernel."""
+
+
+@contextlib.contextmanager
+def following_kernels(on_kernel: Callable[[int], None]) -> Iterator[None]:
+    """Call a function before each kernel that this thread compiles, with how many it has compiled before."""
+    from numba.core import event
+
+    class Follower(event.Listener):  # type: ignore[misc]  # numba has no types
+        done = 0
+        thread = threading.get_ident()
+
+        def on_start(self, _started: event.Event) -> None:
+            if threading.get_ident() == self.thread:
+                on_kernel(self.done)
+
+        def on_end(self, _ended: event.Event) -> None:
+            self.done += threading.get_ident() == self.thread
+
+    with event.install_listener("numba:compile", Follower()):
         yield
 
 

@@ -73,6 +73,7 @@ class MemoryLink:
         self.config = config
         self.is_open = False
         self.last_error: str | None = None
+        self.opener = None
         self.plugged = True
         self.opened_s = 0.0
         self._robot = robot

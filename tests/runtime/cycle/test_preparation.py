@@ -35,13 +35,15 @@ class Preparation:
 
     progress = "recognition is being prepared: 3 of 10 kernels, about 7 s left"
 
-    def __init__(self, seconds: float = PREPARING_S, error: UserError | None = None) -> None:
+    def __init__(self, seconds: float = PREPARING_S, error: UserError | None = None, ring_s: float = 0.0) -> None:
         self._seconds = seconds
+        self._ring_s = ring_s
         self._error = error
         self.is_cancelled = False
         self.is_over = asyncio.Event()
 
     async def ring(self, settings: Settings) -> None:
+        await asyncio.sleep(self._ring_s)
         self.has_ring = settings.ring == SETTINGS.ring
 
     async def __call__(self, settings: Settings) -> None:
@@ -54,6 +56,18 @@ class Preparation:
             raise
         if self._error is not None:
             raise self._error
+
+
+class Port:
+    """A port to which a robot is plugged in, or that is missing."""
+
+    def __init__(self, *, is_missing: bool = False) -> None:
+        self.is_missing = is_missing
+
+    async def connect(self, is_stopping: Callable[[], bool]) -> None:
+        assert not is_stopping()
+        if self.is_missing:
+            raise UserError("no such port")
 
 
 class Run:
@@ -71,6 +85,7 @@ class Run:
         self.holds: list[str | None] = []
         self.speeds: list[float] = []
         self.log = LogCapture()
+        self.shown: list[str] = []
 
     @property
     def unprepared(self) -> list[CycleRecord]:
@@ -92,7 +107,7 @@ class Run:
             process = RobotProcess(
                 settings,
                 structlog.wrap_logger(None, processors=[self.log]),
-                Observers(on_cycle),
+                Observers(on_cycle, on_starting=self.shown.append),
                 loop.time,
                 preparation=self._preparation,
             )
@@ -128,17 +143,35 @@ def test_the_robot_drives_before_recognition_is_ready_and_goes_on_with_it(monkey
 async def test_what_begins_with_recognition_is_measured_between_two_cycles() -> None:
     seen: list[bool] = []
 
-    async def connect() -> None:
-        """Do nothing."""
-
     running = RunningPreparation(Preparation(0.0), structlog.get_logger(), lambda: seen.append(running.is_running))
-    await running.start(SETTINGS, connect)
+    await running.start(SETTINGS, Port(), lambda: False)
     while not seen:
         assert running.progress(0.0) is not None
         await asyncio.sleep(0)
     await asyncio.sleep(0)
     assert running.progress(0.0) is None, "the cycle with which recognition begins"
     assert seen == [True], "before that cycle, and once"
+
+
+def test_a_long_wait_for_the_ring_is_reported_every_few_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a machine with much else to do it lasts minutes."""
+    run = Run(monkeypatch, Preparation(ring_s=12.0))
+    run.drive(16.0)
+    assert len(run.shown) == len(set(run.shown)) == 2, "each says something new"
+    assert run.shown == [entry["event"] for entry in run.log.entries if entry["event"] in run.shown]
+    assert max(run.speeds) > 0.1
+
+
+def test_a_run_that_ends_while_the_ring_is_prepared_ends_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = Run(monkeypatch, Preparation(ring_s=1e6))
+    run.drive(3.0)
+    assert (run.summary["mode"], run.summary["cycles"], run.log.entries) == ("CONNECTING", 0, [])
+
+
+async def test_a_port_that_is_missing_is_named_before_the_ring_is_prepared() -> None:
+    running = RunningPreparation(Preparation(ring_s=1e6), structlog.get_logger(), lambda: None)
+    with pytest.raises(UserError, match="no such port"):
+        await running.start(SETTINGS, Port(is_missing=True), lambda: False)
 
 
 @pytest.mark.usefixtures("warm_kernels")

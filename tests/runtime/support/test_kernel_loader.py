@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 import structlog
+from numba.core import event
 from structlog.testing import LogCapture
 
 from config.errors import UserError
@@ -181,7 +182,7 @@ async def test_a_preparation_compiles_in_another_process_and_loads_the_rest(
 ) -> None:
     compiler = Compiler(monkeypatch, tmp_path, (BAYES,))
     preparation = KernelPreparation((EMULATOR, RING, BAYES))
-    assert preparation.progress == kernel_loader.PREPARING
+    assert preparation.progress == kernel_loader.RING_WAIT
     await preparation(ROUND)
     assert compiler.words == ["bayes,emulator", "whole"], "what the robot waits for comes first"
     assert compiler.loaded == [(BAYES,)], "the emulator is another process"
@@ -218,6 +219,28 @@ async def test_what_the_first_cycle_needs_is_compiled_in_a_thread_of_this_proces
     assert KernelPreparation((EMULATOR, RING, BAYES)).first_start is None
 
 
+async def test_the_rings_kernels_are_counted_and_the_end_of_the_run_ends_them(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    Compiler(monkeypatch, tmp_path, ())
+    preparation = KernelPreparation((EMULATOR, RING, BAYES))
+    said, done = list[str](), threading.Event()
+
+    def compile_three(*_: object) -> None:
+        for number in range(3):
+            if number == 2:  # the run ends meanwhile
+                asyncio.run_coroutine_threadsafe(preparation.close(), loop).result(5.0)
+            with event.trigger_event("numba:compile", {}):
+                said.append(preparation.progress)
+        done.set()
+
+    loop = asyncio.get_running_loop()
+    monkeypatch.setattr(kernel_loader, "compile_parts", compile_three)
+    await preparation.begin_ring(ROUND)
+    assert [text.partition(": ")[2].partition(" of ")[0] for text in said] == ["0", "1"]
+    assert not done.is_set()
+
+
 async def test_a_preparation_without_a_result_says_why(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     compiler = Compiler(monkeypatch, tmp_path, ())
     compiler.errors = b"Traceback\nOSError: [Errno 28] No space left on device\n"
@@ -226,7 +249,7 @@ async def test_a_preparation_without_a_result_says_why(monkeypatch: pytest.Monke
 
 
 def test_every_part_that_a_run_may_need_has_its_count_of_kernels() -> None:
-    assert kernel_loader.KERNEL_COUNTS.keys() == {*kernels.PARTS} - {EMULATOR, RING}
+    assert kernel_loader.KERNEL_COUNTS.keys() == {*kernels.PARTS} - {EMULATOR}
     assert all(kernel_loader.KERNEL_COUNTS.values())
 
 

@@ -332,6 +332,7 @@ async def _whole_run(
         line_messages = messages_on(settings.link.port)
         importing = asyncio.create_task(asyncio.to_thread(import_rest))
         if preparation is not None:
+            running.push_async_callback(preparation.close)
             if preparation.first_start is not None:
                 log.info(preparation.first_start)
                 if view is not None:

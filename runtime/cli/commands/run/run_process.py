@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import signal
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from runtime.cli.commands.foxglove import foxglove_beside
@@ -82,6 +83,8 @@ async def run_process(
                 listener(record, state, stats, driver)
 
         observers = recording.observers(on_cycle, log)
+        if view is not None:
+            observers = replace(observers, on_starting=view.print)
         process = RobotProcess(
             settings,
             log,
