@@ -14,6 +14,7 @@ from config.robot import RobotConfig
 from drivers.denning import frames
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Drive, Halt, Hello, Listen, NakCode, Pattern, Release
+from drivers.denning.wire_units import TENTH_FT_M, wire_pattern
 from drivers.messages import Flags, Pose, Twist, wrap_angle
 from drivers.ros2.range_meaning import Limits, range_meaning
 
@@ -41,6 +42,9 @@ class RobotSide:
         self._config, self._boot_id = config, boot_id
         self._sensors = {name: k for k, name in enumerate(config.ros2.frames)}
         self._unit_um = max(UNIT_MIN_UM, round(1e6 * config.ring.resolution_m))
+        window_m = TENTH_FT_M * wire_pattern(config.ring).window
+        self._limits = Limits(config.ring.range_min_m, min(config.ring.range_max_m, window_m))
+        """Of the ring: what lies beyond the window of the protocol, in whole tenths of a foot, is silence."""
         self._radius_mm = round(1e3 * max(math.hypot(mount.x_m, mount.y_m) for mount in config.ring.mounts))
         self._decoder, self._seq = Decoder("host"), 0
         self._out = bytearray()
@@ -198,14 +202,8 @@ class RobotSide:
 
     def _count(self, frame: str, value: float, limits: Limits) -> int:
         """Return a range as a count."""
-        ring = self._config.ring
-        meaning = range_meaning(
-            value,
-            Limits(ring.range_min_m, min(ring.range_max_m, ring.window_m)),
-            limits,
-            1e-6 * self._unit_um,
-            zero_is_silence=self._config.ros2.zero_is_silence,
-        )
+        is_silence = self._config.ros2.zero_is_silence
+        meaning = range_meaning(value, self._limits, limits, 1e-6 * self._unit_um, zero_is_silence=is_silence)
         if meaning.oddity is not None:
             self._note(meaning.oddity.value.format(frame=frame, least_m=meaning.least_m), meaning.oddity.name)
         if math.isnan(meaning.range_m):

@@ -122,6 +122,7 @@ def test_an_unknown_frame_is_one_line() -> None:
         (0.0, math.nan),
         (-1.0, math.nan),
         (4.0, math.inf),
+        (3.996, math.inf),  # beyond the window, which is 13.1 ft
         (3.99, 3.99),
         (0.1, 0.1),
         (2.0, 2.0),
