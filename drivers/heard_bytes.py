@@ -46,19 +46,21 @@ class HeardBytes:
     ----------
     total
         Number of bytes received since `clear`.
+    has_frames
+        Whether valid frames were among them; set by the driver, which decodes them.
     find_robot
         Returns which robot of another family sends these bytes, as a phrase; None if none does.
     """
 
     def __init__(self) -> None:
-        self.total = 0
+        self.total, self.has_frames = 0, False
         self.find_robot: Callable[[bytes], str | None] | None = None
         self._received = self._sent = b""
         self._stranger: str | None = None
 
     def clear(self) -> None:
         """Forget all bytes: the robot has sent what it should, or this is another line."""
-        self.total, self._received, self._stranger = 0, b"", None
+        self.total, self.has_frames, self._received, self._stranger = 0, False, b"", None
 
     def begin_speed(self) -> None:
         """Forget the bytes, as those to come have another speed; keep what was found out."""

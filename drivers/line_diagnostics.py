@@ -80,8 +80,8 @@ def noise(bad: int, what: str) -> str | None:
 def no_answer(what: str, frames: int, heard: HeardBytes) -> str:
     """Return the message for a robot that does not answer a call.
 
-    `what` is the call and how it was made, as "no answer to 3 HELLO commands". So far `frames` valid ones came on the
-    line, and the bytes of `heard`.
+    `what` is the call and how it was made, as "no answer to 3 HELLO commands". `frames` valid ones came lately on the
+    line, and before the bytes of `heard`.
     """
     if (stranger := heard.stranger) is not None:
         return f"{what}, and {stranger}"
@@ -89,6 +89,11 @@ def no_answer(what: str, frames: int, heard: HeardBytes) -> str:
         return (
             f"{what} although the robot sends other frames; the line to it is broken, or another program reads its "
             f"port: check the cable, and that no other program uses the port; then restart the robot"
+        )
+    if heard.has_frames:
+        return (
+            f"{what}, although valid frames of a robot came before; it was switched off since, or loses packets, or "
+            f"another program reads its port: check its power and cable, then restart it, or its simulator"
         )
     if heard.total:
         return (

@@ -271,7 +271,7 @@ class ArcosDriver(Session[PoseStamper]):
         self._refused_until_s = self._run_s + _REFUSED_S
 
     def _take(self, packet: Packet) -> None:
-        self._packet_s = self._run_s
+        self._packet_s, self.heard.has_frames = self._run_s, True
         if isinstance(packet, ResetNotice):
             self._was_reset = True
             if self._state is LineState.READY:

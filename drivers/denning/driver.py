@@ -104,7 +104,7 @@ class DenningDriver(Session[PoseStamper]):
             return
         self.heard.received(data)
         for frame in self._decoder.feed(data):
-            self._last_frame_s = run_s
+            self._last_frame_s, self.heard.has_frames = run_s, True
             self._take_frame(frame)
 
     def tick(self, run_s: float) -> None:

@@ -322,7 +322,7 @@ class RflexDriver(Session[Measurements]):
 
     def _take(self, frame: Frame) -> None:
         """Take in a frame; ranges that come before READY are dropped."""
-        self._report_s = self._run_s
+        self._report_s, self.heard.has_frames = self._run_s, True
         match report_of(frame):
             case AxisReport() as axis:
                 self._take_axis(axis)

@@ -70,6 +70,8 @@ def test_the_message_about_a_mute_line_says_what_was_tried_and_heard() -> None:
     heard.received(b"\xf3" * 9)
     assert "no answer to SYNC0, and what is received is no frame" in no_answer((), 0, heard)
     assert "no answer to SYNC0 although the robot sends other frames" in no_answer((), 1, heard)
+    heard.has_frames = True
+    assert "no answer to SYNC0, although valid frames of a robot came before" in no_answer((), 0, heard)
     heard.received(b"Hello from the sketch\r\n" * 9)
     assert "and a device sends text, as 'Hello from the sketch'" in no_answer((), 1, heard)
     assert "as 'Hello from the sketch'" in unanswered(Stage.SYNC1, heard)

@@ -214,3 +214,14 @@ def test_valid_packets_without_an_answer_are_not_called_nothing() -> None:
         harness.to_driver(encode(RobotName("sim", "Pioneer", "p3dx")))
     assert harness.state() is LineState.DOWN
     assert "although the robot sends other frames" in (harness.driver.problem or "")
+
+
+def test_a_valid_packet_before_noise_is_not_forgotten() -> None:
+    harness = Harness(OVER_TCP)
+    harness.controller.mute = True
+    harness.open()
+    harness.to_driver(encode(RobotName("sim", "Pioneer", "p3dx")))
+    for _ in range(50):
+        harness.run(0.1)
+        harness.to_driver(b"\x80\x01")
+    assert "although valid frames of a robot came before" in (harness.driver.problem or "")
