@@ -86,11 +86,12 @@ class RepeatFilter:
 
     Silence repeats to the bit when a sensor fires again and hears nothing. It counts once in each cycle of the ring.
 
-    Each sensor fires once in `cycle_s`, which is in the firings' unit of time.
+    Each sensor fires once in `cycle_s`, which is in the firings' unit of time. Values that differ from the last
+    reading by `same_m` at most repeat it: a program that adds noise to what it repeats.
     """
 
-    def __init__(self, sensors: int, cycle_s: float) -> None:
-        self.cycle_s = cycle_s
+    def __init__(self, sensors: int, cycle_s: float, same_m: float = 0.0) -> None:
+        self.cycle_s, self._same_m = cycle_s, same_m
         self._last: Floats = np.full(sensors, np.nan)
         self._read_s: Floats = np.full(sensors, np.inf)
         """When each sensor last fired; inf before the first firing, of which nothing is known to be new."""
@@ -100,8 +101,10 @@ class RepeatFilter:
         ranges, is_first = firing.ranges_m, bool(np.isposinf(self._read_s).all())
         has = ~np.isnan(ranges)
         is_due = np.isposinf(ranges) & (firing.robot_s - self._read_s >= 0.999 * self.cycle_s)
-        is_new = has & ((ranges != self._last) | is_due) & (not is_first)
-        self._last = np.where(has, ranges, self._last)
+        with np.errstate(invalid="ignore"):
+            differs = has & (ranges != self._last) & ~(np.abs(ranges - self._last) <= self._same_m)
+        is_new = (differs | (has & is_due)) & (not is_first)
+        self._last = np.where(differs, ranges, self._last)
         self._read_s = np.where(is_new | is_first, firing.robot_s, self._read_s)
         return replace(firing, ranges_m=np.where(is_new, ranges, np.nan))
 

@@ -13,8 +13,8 @@ from typing import Final
 from config.robot import RobotConfig
 from drivers.denning import frames
 from drivers.denning.codec import Decoder, encode
-from drivers.denning.frames import Drive, Halt, Hello, Listen, NakCode, Pattern, Release
-from drivers.denning.wire_units import TENTH_FT_M, wire_pattern
+from drivers.denning.frames import TENTH_FT_M, Drive, Halt, Hello, Listen, NakCode, Pattern, Release
+from drivers.denning.wire_units import wire_pattern
 from drivers.messages import Flags, Pose, Twist, wrap_angle
 from drivers.ros2.range_meaning import Limits, range_meaning
 

@@ -26,7 +26,7 @@ from runtime.recording.conventions.headings import (
 )
 from runtime.recording.conventions.not_fired import find_not_fired, option_of, without_not_fired
 from runtime.recording.conventions.options import RingLogOptions
-from runtime.recording.conventions.repeats import find_repeats
+from runtime.recording.conventions.repeats import Repeats, find_repeats, noise_of_repeats
 from runtime.recording.conventions.sensor_order import Shift, find_exchange, find_shift, mirrored_columns
 from runtime.recording.conventions.silence import Silence, check_near, find_silence
 from runtime.recording.conventions.table import ANGLES, HEADINGS, LENGTHS, TIMES, Table
@@ -51,6 +51,8 @@ class Conventions:
         The column of each sensor where the file's order is mirrored.
     cycle_s : float, optional
         Of a log of last values, of which only changes are readings: time in which each sensor fires once.
+    same_m : float
+        Smaller changes are none, m.
     said : tuple of str
         What was found in the data, and the option that sets it; empty for a log in the form's own conventions.
     """
@@ -61,6 +63,7 @@ class Conventions:
     angles: Angles = _RADIANS
     columns: NDArray[np.int64] | None = None
     cycle_s: float | None = None
+    same_m: float = 0.0
     said: tuple[tuple[str, str], ...] = ()
 
     @property
@@ -127,18 +130,12 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
         said.append((silence.words, f"--silence {silence.option}, or --silence inf if they are ranges"))
     ranges = _shown(table.ranges, silence)
     table = table._replace(ranges=ranges if columns is None else ranges[:, columns])
-    period = find_repeats(table, set_size) if options.latched == "auto" else 1.0
-    is_latched = options.latched == "yes" or period > 1.0
+    repeats = _asked_repeats(table, options, set_size)
+    is_latched = options.latched == "yes" or repeats.rows > 1.0
     if is_latched:
-        table = table._replace(ranges=_without_repeats(table.ranges))
+        table = table._replace(ranges=_without_repeats(table.ranges, repeats.same))
         if options.latched == "auto":
-            said.append(
-                (
-                    f"each value is repeated, for {period:g} rows mostly, until its sensor fires again: only changes "
-                    "are readings",
-                    "--latched yes, or no if all are fresh",
-                )
-            )
+            said.append((repeats.words, "--latched yes, or no if all are fresh"))
     motion = motion_scores(table, options)
     likely = next(one for one in motion.scores)
     if motion.is_related:
@@ -162,8 +159,9 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
             return found[angles]
 
         check_scale(units, scores, echoes)
-    cycle_s = max(pattern_s, _period_s(table, units, period)) if is_latched else None
-    return Conventions(silence, not_fired, units, angles, columns, cycle_s, tuple(said))
+    cycle_s = max(pattern_s, _period_s(table, units, repeats.rows)) if is_latched else None
+    same_m = LENGTHS[units.range_] * repeats.same
+    return Conventions(silence, not_fired, units, angles, columns, cycle_s, same_m, tuple(said))
 
 
 def _firing_limits(ring: RingConfig) -> tuple[int, float]:
@@ -178,9 +176,16 @@ def _firing_limits(ring: RingConfig) -> tuple[int, float]:
     return pattern.set_size, pattern.cycle_s
 
 
-def _without_repeats(ranges: Floats) -> Floats:
+def _asked_repeats(table: Table, options: RingLogOptions, set_size: int) -> Repeats:
+    """Return how values are repeated, by the option or by the data; of `--latched yes` only what noise they have."""
+    if options.latched == "auto":
+        return find_repeats(table, set_size)
+    return Repeats(same=noise_of_repeats(table.ranges) if options.latched == "yes" else 0.0)
+
+
+def _without_repeats(ranges: Floats, same: float) -> Floats:
     still = Pose(0.0, 0.0, 0.0)
-    changes = RepeatFilter(ranges.shape[1], np.inf)
+    changes = RepeatFilter(ranges.shape[1], np.inf, same)
     return np.array([changes.fresh(Firing(0.0, still, 0.0, row)).ranges_m for row in ranges])
 
 

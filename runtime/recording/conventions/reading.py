@@ -113,7 +113,7 @@ def converted_firings(
     every = itertools.chain(seen, rows if first >= FIRST else _confirmed(rows, seen, found, path, robot, options))
     firings: Iterator[Firing] = (one if found.is_plain else found.converted(one) for one in every)
     if found.cycle_s is not None:
-        firings = _without_repeats(firings, robot.ring, found.cycle_s)
+        firings = _without_repeats(firings, robot.ring, found.cycle_s, found.same_m)
     yield from _checked(_at_heard_poses(firings, path, robot.ring, options, warn, rows=min(first, LAG_ROWS)), path)
 
 
@@ -160,7 +160,7 @@ def _confirmed(
         yield row
 
 
-def _without_repeats(firings: Iterable[Firing], ring: RingConfig, cycle_s: float) -> Iterator[Firing]:
+def _without_repeats(firings: Iterable[Firing], ring: RingConfig, cycle_s: float, same_m: float) -> Iterator[Firing]:
     """Yield the firings of a log of last values without repeats, from where the robot was when they were fired.
 
     Values that are new in a row are of the firings since the row before, or of the last cycle if that is shorter. A
@@ -168,7 +168,7 @@ def _without_repeats(firings: Iterable[Firing], ring: RingConfig, cycle_s: float
     drums then lie 1 mm from those of the fresh log; 4 mm from them without this.
     """
     step_s = ring.firing.step_period_s
-    changes = RepeatFilter(len(ring.mounts), cycle_s)
+    changes = RepeatFilter(len(ring.mounts), cycle_s, same_m)
     last: Firing | None = None
     for firing in firings:
         fresh = changes.fresh(firing)

@@ -6,7 +6,7 @@ or most numbers are old. Old ones are equal to the bit, and a sensor cannot chan
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,31 @@ ROWS_MIN: Final = 30
 REPEATED: Final = 0.3
 """Share of repeats, as the robot moves, from which a log that shows nothing else is ambiguous: ranges to the
 millimetre repeat hardly ever."""
+DITHER: Final = 2.5
+"""Least changes of the file by which a repeated value may differ, where noise of one last digit is added to each row:
+two digits between two rows, and what is lost by rounding."""
 
 
-def find_repeats(table: Table, set_size: int) -> float:
-    """Return for how many rows a value stands; 1 if each row is fresh.
+class Repeats(NamedTuple):
+    """How long values are repeated."""
+
+    rows: float = 1.0
+    """For how many a value stands; 1 if each row is fresh."""
+    same: float = 0.0
+    """By how much, in the file's unit, a repeated value may differ."""
+
+    @property
+    def words(self) -> str:
+        """What was found."""
+        noise = f", give or take {self.same:.2g}" if self.same else ""
+        return (
+            f"each value is repeated{noise}, for {self.rows:g} rows mostly, until its sensor fires again: only "
+            "changes are readings"
+        )
+
+
+def find_repeats(table: Table, set_size: int) -> Repeats:
+    """Return for how many rows a value stands.
 
     Parameters
     ----------
@@ -44,19 +65,11 @@ def find_repeats(table: Table, set_size: int) -> float:
     ranges = table.ranges
     sensors = ranges.shape[1]
     if len(ranges) < ROWS_MIN or np.median((~np.isnan(ranges)).sum(axis=1)) <= set_size < sensors:
-        return 1.0
-    detector = RepeatDetector(sensors)
-    for row in ranges:
-        detector.add(row)
-    if detector.period > 1:
-        return float(detector.period)
-    changed, great = _changes(ranges)
-    begins = great[:-2]
-    count = begins.sum(axis=0)
-    runs = int((begins & changed[1:-1] & changed[2:]).sum())
-    expected = float((count * changed.mean(axis=0) ** 2).sum())
-    if runs <= GLITCHES * count.sum() and expected - runs > RUNS_NAT:
-        return 1.5  # each value stands for one row or two: no sensor changes three times in a row
+        return Repeats()
+    found = _repeats(ranges)
+    if found.rows > 1.0:
+        return found
+    changed, _ = _changes(ranges)
     known = np.isfinite(ranges[1:]) & np.isfinite(ranges[:-1]) & table.moved[1:, None]
     repeated = float((~changed[known]).mean()) if known.sum() >= ROWS_MIN * sensors else 0.0
     if repeated > REPEATED and set_size < sensors:
@@ -64,7 +77,50 @@ def find_repeats(table: Table, set_size: int) -> float:
             f"has more ranges in a row than sensors fire at once, and {100 * repeated:.0f} % of them are those of "
             "the row before: say --latched yes if rows repeat the last value of every sensor, no if all are fresh"
         )
-    return 1.0
+    return Repeats()
+
+
+def noise_of_repeats(ranges: Floats) -> float:
+    """Return by how much repeated values differ, in a log, (n, sensors), that is known to repeat them; 0 mostly."""
+    return _repeats(ranges).same
+
+
+def _repeats(ranges: Floats) -> Repeats:
+    """Return what the changes show: of values to the bit, or else of values but for their last digit."""
+    for same in (0.0, DITHER * _least_change(ranges)):
+        held = _without_dither(ranges, same) if same else ranges
+        detector = RepeatDetector(ranges.shape[1])
+        for row in held:
+            detector.add(row)
+        if detector.period > 1:
+            return Repeats(float(detector.period), same)
+        changed, great = _changes(held)
+        begins = great[:-2]
+        count = begins.sum(axis=0)
+        runs = int((begins & changed[1:-1] & changed[2:]).sum())
+        expected = float((count * changed.mean(axis=0) ** 2).sum())
+        if runs <= GLITCHES * count.sum() and expected - runs > RUNS_NAT:
+            return Repeats(1.5, same)  # each value stands for one row or two: no sensor changes three times in a row
+    return Repeats()
+
+
+def _least_change(ranges: Floats) -> float:
+    """Return the least change from row to row that is none of 0; 0 if nothing changes."""
+    with np.errstate(invalid="ignore"):
+        change = np.abs(np.diff(ranges, axis=0))
+    change = change[np.isfinite(change) & (change > 0.0)]
+    return float(change.min()) if len(change) else 0.0
+
+
+def _without_dither(ranges: Floats, same: float) -> Floats:
+    """Return ranges, (n, sensors), in which values that differ from a sensor's last one by `same` at most are it."""
+    held, last = ranges.copy(), np.full(ranges.shape[1], np.nan)
+    with np.errstate(invalid="ignore"):
+        for row in held:
+            near = np.abs(row - last) <= same
+            row[near] = last[near]
+            last = np.where(np.isnan(row), last, row)
+    return held
 
 
 def _changes(ranges: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

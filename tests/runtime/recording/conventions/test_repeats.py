@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from drivers.firing_pattern import firing_pattern
-from runtime.recording.conventions.repeats import find_repeats
+from drivers.latched_ranges import RepeatFilter
+from drivers.messages import Firing, Pose
+from runtime.recording.conventions.repeats import Repeats, find_repeats, noise_of_repeats
 from runtime.recording.conventions.table import Table
 from runtime.recording.ring_log import RingLogError
 from tests.runtime.recording.conventions.tables import Drive, latched, make_drive
 
 
-def repeats(drive: Drive) -> float:
+def found(drive: Drive) -> Repeats:
     set_size = firing_pattern(drive.settings.ring).set_size
     return find_repeats(Table(drive.t, drive.pose, np.round(drive.ranges, 4)), set_size)
+
+
+def repeats(drive: Drive) -> float:
+    return found(drive).rows
 
 
 @pytest.mark.parametrize(
@@ -29,3 +37,19 @@ def test_last_values_are_found_and_firings_are_fresh(robot: str, world: str, lea
 def test_a_table_that_shows_too_little_is_refused_with_the_option() -> None:
     with pytest.raises(RingLogError, match="say --latched yes if"):
         repeats(latched(make_drive(3, "denning", "hall", "cone"), 0.2))
+
+
+@pytest.mark.parametrize("robot", ["p3dx", "denning"])
+def test_noise_of_the_last_digit_does_not_make_last_values_fresh(robot: str) -> None:
+    drive, rng = make_drive(3, robot, "room", "cone"), np.random.default_rng(3)
+    clean = latched(drive)
+    noisy = replace(clean, ranges=clean.ranges + 1e-4 * rng.integers(-1, 2, clean.ranges.shape))
+    assert found(noisy).rows == repeats(clean)
+    assert 2e-4 < found(noisy).same < 3e-4
+    assert noise_of_repeats(np.round(clean.ranges, 4)) == 0.0
+    kept, held = RepeatFilter(clean.ranges.shape[1], 1e3), RepeatFilter(clean.ranges.shape[1], 1e3, found(noisy).same)
+    rows = [Firing(t, Pose(0.0, 0.0, 0.0), 0.0, row) for t, row in zip(clean.t, clean.ranges, strict=True)]
+    others = [replace(one, ranges_m=row) for one, row in zip(rows, noisy.ranges, strict=True)]
+    fresh = [~np.isnan(kept.fresh(one).ranges_m) for one in rows]
+    again = [~np.isnan(held.fresh(one).ranges_m) for one in others]
+    assert np.mean(np.array(fresh) == np.array(again)) > 0.99
