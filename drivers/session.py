@@ -13,11 +13,53 @@ from drivers.heard_bytes import HeardBytes
 from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
 from drivers.stamper import Stamper
 
+GAPS_MIN: Final = 2
+"""So many gaps in a row, with a single sample between them, are no restart and no replugged cable."""
 FIRINGS_MAX: Final = 1024
 """Firings kept if they are not taken; the oldest are dropped. At 20 firings a second this is almost a minute."""
 
 
 S = TypeVar("S", bound=Stamper)
+
+RARE: Final = (
+    "samples of odometry come more than {:g} s apart, after which the line counts as down; the robot sends them too "
+    "rarely, or its line delivers them late: set the robot to send them at least every {:g} s, or raise "
+    "link.silence_max_s, and look for what delays the line"
+)
+
+
+class OdometryGaps:
+    """Detects odometry that comes too rarely: each sample would raise the line, and the wait for the next lower it.
+
+    A restart or a loose cable makes one gap, and samples follow each other after it.
+
+    Parameters
+    ----------
+    longest_s : float
+        Longest gap after which the line is not down, s.
+    """
+
+    def __init__(self, longest_s: float) -> None:
+        self._longest_s = longest_s
+        self._looked_s = self._sample_s = -math.inf
+        self._gaps, self._gap_s = 0, 0.0
+        """Gaps in a row, and the last of them, s."""
+
+    def look(self, run_s: float, *, came: bool) -> None:
+        """Take whether a sample came since the last look; after a long time without a look, gaps say nothing."""
+        late, self._looked_s = run_s - self._looked_s > 0.5 * self._longest_s, run_s
+        if late:
+            self._gaps, self._sample_s = 0, -math.inf
+        elif came:
+            gap_s, self._sample_s = run_s - self._sample_s, run_s
+            is_gap = self._longest_s < gap_s < math.inf
+            self._gaps, self._gap_s = (self._gaps + 1, gap_s) if is_gap else (0, 0.0)
+
+    def problem(self, run_s: float) -> str | None:
+        """Return what is wrong where the last samples came too rarely and the next is not long overdue."""
+        if self._gaps < GAPS_MIN or run_s - self._sample_s > 2.0 * self._gap_s:
+            return None
+        return RARE.format(self._longest_s, 0.5 * self._longest_s)
 
 
 class Session(ABC, Generic[S]):
@@ -29,8 +71,9 @@ class Session(ABC, Generic[S]):
         The bytes of the line in place of the robot's frames.
     """
 
-    def __init__(self, stamper: S) -> None:
+    def __init__(self, stamper: S, silence_max_s: float = math.inf) -> None:
         self.stamper = stamper
+        self._odometry_gaps = OdometryGaps(silence_max_s)
         self._state = LineState.CLOSED
         self._problem: str | Callable[[], str] | None = None
         """What is wrong; a function where that follows what is received."""
@@ -51,13 +94,19 @@ class Session(ABC, Generic[S]):
 
     @property
     def state(self) -> LineState:
-        """The state of the connection."""
-        return self._state
+        """The state of the connection; DOWN while odometry comes too rarely to keep it up."""
+        return LineState.DOWN if self._rare is not None else self._state
 
     @property
     def problem(self) -> str | None:
         """What is wrong, in one line; None if nothing is."""
+        if self._rare is not None:
+            return self._rare
         return self._problem() if callable(self._problem) else self._problem
+
+    @property
+    def _rare(self) -> str | None:
+        return None if self._state is LineState.CLOSED else self._odometry_gaps.problem(self._run_s)
 
     @property
     def identity(self) -> Identity | None:
@@ -106,6 +155,7 @@ class Session(ABC, Generic[S]):
 
     def take_received(self) -> Received:
         """Return what was received since the last call, and remove it."""
+        self._odometry_gaps.look(self._run_s, came=self._odometry is not None)
         received = Received(tuple(self._firings), self._odometry, self._rebooted, self.stamper.notes(), self._flags)
         self._firings.clear()
         self._odometry, self._flags, self._rebooted = None, Flags.NONE, False

@@ -72,7 +72,7 @@ class ArcosDriver(Session[PoseStamper]):
         finer = line_diagnostics.finer_than_line(config.ring.resolution_m, RANGE_UNIT_M)
         if finer is not None:
             raise DriverError(finer)
-        super().__init__(PoseStamper(config, self._discs))
+        super().__init__(PoseStamper(config, self._discs), config.link.silence_max_s)
         self._polling = polling_of(config, self._discs)
         refuse_slow_line(config.link, SIP_BYTES / SIP_PERIOD_S, *traffic_of(self._polling, self._discs))
         self._handshake = Handshake(config.link, has_speed="://" not in (config.link.port or ""))

@@ -168,6 +168,7 @@ def drive_commands(twist: Twist, limits: Limits) -> tuple[Command, Command]:
 def flags_of(sip: Sip, low_battery: int) -> Flags:
     """Return the base's status; `low_battery` is the voltage, 0.1 V, below which the battery counts as low.
 
+    A robot that reports 0 V runs on a battery that it does not measure: that counts as low, too.
     Motors that are off, for whatever reason, are the latch of this base: it moves again only when they are enabled.
     """
     flags = Flags.NONE
@@ -178,6 +179,6 @@ def flags_of(sip: Sip, low_battery: int) -> Flags:
         flags |= Flags.BUMPER
     if (sip.stall_left | sip.stall_right) & _STALLED:
         flags |= Flags.MOTOR_FAULT
-    if (sip.battery_10 or sip.battery) < low_battery:
+    if (sip.battery_10 or sip.battery) < max(1, low_battery):
         flags |= Flags.BATTERY_LOW
     return flags

@@ -45,7 +45,7 @@ class DenningDriver(Session[PoseStamper]):
         self._config = config
         self._pattern, self._listeners = wire_pattern(config.ring), firing_pattern(config.ring).listeners
         self._sweeps = wire_scan(config.ring)
-        super().__init__(PoseStamper(config.ring, config.body))
+        super().__init__(PoseStamper(config.ring, config.body), config.link.silence_max_s)
         self.stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
         version = newest_version(config)
         finer = line_diagnostics.finer_than_line(config.ring.resolution_m, finest_range_m(config.ring, version))
@@ -71,7 +71,7 @@ class DenningDriver(Session[PoseStamper]):
     @property
     def problem(self) -> str | None:
         """What is wrong, in one line; None if nothing is."""
-        if self._problem is None and self._state is LineState.READY:
+        if self._problem is None and self.state is LineState.READY:
             corrupt = self._echo_timeout.corrupt_frames(self._run_s, self._decoder.bad)
             return line_diagnostics.noise(corrupt, "its echoes")
         return super().problem

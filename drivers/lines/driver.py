@@ -29,7 +29,7 @@ class LineDriver(Session[LineStamper]):
     """
 
     def __init__(self, config: RobotConfig, wire: Wire) -> None:
-        super().__init__(LineStamper(config, wire.period_s))
+        super().__init__(LineStamper(config, wire.period_s), config.link.silence_max_s)
         self._config, self._wire = config, wire
         self._pattern = firing_pattern(config.ring)
         self.stamper.set_pattern(self._pattern)

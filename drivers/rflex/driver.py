@@ -79,7 +79,7 @@ class RflexDriver(Session[Measurements]):
         axes = 2 * len(encode(frame_of(AxisReport(0, 0, 0, 0)))) / REPORT_PERIOD_S
         ranges = SonarReport(0, tuple((0, 0) for _ in config.rflex.banks))
         refuse_slow_line(config.link, axes, len(encode(frame_of(ranges))), 1e-6 * self._pattern.step_us)
-        super().__init__(Measurements(config, sonar_ids(config)))
+        super().__init__(Measurements(config, sonar_ids(config)), config.link.silence_max_s)
         self.stamper.set_pattern(self._pattern)
         self._decoder = Decoder()
         self._boots = 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from drivers.driver import Received
+from drivers.messages import Flags
 from drivers.token_bucket import LineLimit
 from perception.localization.localized_pose import Status
 from perception.pipeline import Perception
@@ -18,6 +19,12 @@ if TYPE_CHECKING:
 LINES_PER_S: Final = 1.0
 LINES_BURST: Final = 60.0
 """Lines at once: two for each sensor of a ring, and some."""
+
+BATTERY_PER_S: Final = 1.0 / 600.0
+"""Lines on a battery that stays low, 1/s: a reminder every ten minutes."""
+BATTERY: Final = (
+    "the base reports that its battery is low: charge it, or, if it is full, check what measures its voltage"
+)
 
 
 class Alerts:
@@ -33,6 +40,7 @@ class Alerts:
         self._ring_problems: set[str] = set()
         self._has_told_lag = False
         self._silence: str | None = None
+        self._battery = LineLimit(BATTERY_PER_S, 1.0)
         self.recovered: list[str] = []
         """Of the last update: what is well again, and needs nobody."""
 
@@ -46,6 +54,8 @@ class Alerts:
         if (problem := state.ring_problem) is not None and state.mode.reason != problem:
             facts += [] if problem in self._ring_problems else [f"while the robot does not drive: {problem}"]
             self._ring_problems.add(problem)
+        if Flags.BATTERY_LOW in received.flags and self._battery.take(run_s) is not None:
+            facts.append(BATTERY)
         before, self._silence = self._silence, state.echo_watch.silence
         if before != self._silence:
             facts += [] if self._silence is None else [self._silence]

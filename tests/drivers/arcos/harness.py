@@ -130,6 +130,7 @@ class Harness:
         self.now = 100.0
         self.received: list[Received] = []
         self.states: list[LineState] = []
+        self.sip_period_s = SIP_S
         self._sip_s = 0.0
 
     def open(self) -> None:
@@ -155,7 +156,7 @@ class Harness:
         commands: list[Command] = []
         for _ in range(round(seconds / STEP_S)):
             self.now += STEP_S
-            if self.now - self._sip_s >= SIP_S - 1e-9:
+            if self.now - self._sip_s >= self.sip_period_s - 1e-9:
                 self._sip_s = self.now
                 self.to_driver(self.controller.next_sip())
             self.driver.tick(self.now)

@@ -7,12 +7,12 @@ from types import SimpleNamespace
 from typing import Any
 
 from drivers.driver import Received
-from drivers.messages import Pose
+from drivers.messages import Flags, Pose
 from perception.detected_object import MapCounts
 from perception.localization.submaps.echo_lag import FoundLag
 from perception.sensor_faults.report import SensorReport
 from runtime.cycle.echo_watch import OPEN_M, EchoWatch
-from runtime.cycle.logs.alerts import LINES_BURST, LINES_PER_S, Alerts
+from runtime.cycle.logs.alerts import BATTERY, LINES_BURST, LINES_PER_S, Alerts
 
 NOTHING = Received((), None, rebooted=False)
 
@@ -54,6 +54,13 @@ def test_a_long_silence_is_a_line_once_until_the_ring_hears_again() -> None:
     assert lines[1][0].startswith("no sensor has heard anything new over the last 4 m")
     assert alerts.update(NOTHING, state(perception), 0.0) == []
     assert alerts.recovered == ["the ring hears echoes again"]
+
+
+def test_a_low_battery_is_a_line_now_and_then() -> None:
+    alerts, perception = Alerts(), StubPerception()
+    low = Received((), None, rebooted=False, flags=Flags.BATTERY_LOW)
+    moments = [alerts.update(low, state(perception), float(run_s)) for run_s in range(1500)]
+    assert [run_s for run_s, lines in enumerate(moments) if lines == [BATTERY]] == [0, 600, 1200]
 
 
 def test_each_fact_is_reported_once() -> None:
