@@ -1,12 +1,16 @@
-"""The results of perception: detected objects with their uncertainty, and counts of what a method holds."""
+"""The results of perception: detected objects with their uncertainty, and counts of what a method holds.
+
+The process that draws the live view imports this module, so it imports nothing that takes long.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from drivers.messages import IDENTITY, Pose
+if TYPE_CHECKING:
+    from drivers.messages import Pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,9 +131,9 @@ class MapCounts(NamedTuple):
 
 def turned_object(to: Pose, seen: DetectedObject) -> DetectedObject:
     """Return an object in another frame, in which the present origin lies at `to`."""
-    if to == IDENTITY:
+    if (to.x, to.y, to.theta) == (0.0, 0.0, 0.0):
         return seen
-    place = to.compose(Pose(seen.x, seen.y, seen.theta))
+    place = to.compose(replace(to, x=seen.x, y=seen.y, theta=seen.theta))
     if seen.covariance is None:
         return replace(seen, x=place.x, y=place.y, theta=place.theta)
     xx, xy, yy = seen.covariance

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from rich.live import Live
 
 from runtime.cli.terminal.escaping_console import EscapingConsole
-from runtime.cli.terminal.keys import in_foreground
+from runtime.cli.terminal.foreground import in_foreground
 from runtime.cli.terminal.picture import Picture, Scale, Snapshot
 
 

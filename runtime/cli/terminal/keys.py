@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from types import MappingProxyType
 from typing import Final
 
+from runtime.cli.terminal.foreground import in_foreground
 from runtime.cycle.inputs import Request
 
 KEYS_MAX: Final = 64
@@ -20,20 +21,6 @@ KEYS: Final = MappingProxyType({" ": Request.HALT, "h": Request.HALT, "a": Reque
 BACKGROUND_S: Final = 0.25
 """How often a program in the background looks whether it is in the foreground again, s: a shell's fg sends no
 signal to one that runs."""
-
-
-def in_foreground(fd: int) -> bool:
-    """Return whether the program has the terminal: one in the background is stopped if it reads or changes it.
-
-    Parameters
-    ----------
-    fd : int
-        Of the terminal; one that is gone belongs to no program, and may be read.
-    """
-    try:
-        return os.tcgetpgrp(fd) == os.getpgrp()
-    except OSError:
-        return True
 
 
 @contextlib.contextmanager

@@ -8,8 +8,7 @@ from decimal import ROUND_HALF_UP, Decimal
 from typing import TYPE_CHECKING, Final
 
 from config.units import FOOT_M
-from drivers.messages import Pose
-from perception.detected_object import DetectedObject
+from perception.detected_object import DetectedObject, worst_sigma
 from runtime.support.length_format import Units
 
 if TYPE_CHECKING:
@@ -66,7 +65,9 @@ def percent(share: float) -> str:
     return f"{'> 99' if share >= 0.995 else '< 1' if share < 0.005 else math.floor(100.0 * share + 0.5)} %"
 
 
-def is_hidden(seen: DetectedObject, radius_m: float, robot: Pose, objects: Iterable[DetectedObject]) -> bool:
+def is_hidden(
+    seen: DetectedObject, radius_m: float, robot: tuple[float, float], objects: Iterable[DetectedObject]
+) -> bool:
     """Return whether a wall hides an object: the sight line to its middle crosses it, and all of it lies beyond.
 
     Parameters
@@ -76,19 +77,20 @@ def is_hidden(seen: DetectedObject, radius_m: float, robot: Pose, objects: Itera
     radius_m
         Of the object.
     robot
-        In the frame of the objects.
+        x, y in the frame of the objects, m.
     objects
         All that are reported, walls among them.
     """
     if seen.ends is not None:
         return False
+    robot_x, robot_y = robot
     for wall in objects:
         if wall.ends is None:
             continue
         x1, y1, x2, y2 = wall.ends
-        dx, dy, sx, sy = x2 - x1, y2 - y1, seen.x - robot.x, seen.y - robot.y
-        of_robot, of_object = dx * (robot.y - y1) - dy * (robot.x - x1), dx * (seen.y - y1) - dy * (seen.x - x1)
-        of_ends = (sx * (y1 - robot.y) - sy * (x1 - robot.x)) * (sx * (y2 - robot.y) - sy * (x2 - robot.x))
+        dx, dy, sx, sy = x2 - x1, y2 - y1, seen.x - robot_x, seen.y - robot_y
+        of_robot, of_object = dx * (robot_y - y1) - dy * (robot_x - x1), dx * (seen.y - y1) - dy * (seen.x - x1)
+        of_ends = (sx * (y1 - robot_y) - sy * (x1 - robot_x)) * (sx * (y2 - robot_y) - sy * (x2 - robot_x))
         square = dx * dx + dy * dy
         along = 0.0 if square == 0.0 else min(1.0, max(0.0, ((seen.x - x1) * dx + (seen.y - y1) * dy) / square))
         away_m = math.hypot(seen.x - x1 - along * dx, seen.y - y1 - along * dy)
@@ -130,8 +132,6 @@ def twist(v: float, w: float, units: Units) -> str:
 
 def localized_place(here: LocalizedPose, units: Units) -> str:
     """Return the robot's place in the map frame, with the standard errors of its worst direction and its heading."""
-    from perception.detected_object import worst_sigma
-
     said = f"{here.status} {percent(here.probability)}"
     covariance = here.covariance
     if not math.isfinite(float(covariance.sum())):

@@ -1,7 +1,7 @@
 """The picture of a run on a terminal: mode, plan, objects, ring, line and timing.
 
-A process of its own draws it (`python -m runtime.cli.terminal`), which starts with the run. So this module imports
-nothing that takes long.
+A process of its own draws it (`python -m runtime.cli.terminal`), which starts with the run and takes processor time
+from it. So a snapshot holds plain numbers, and this module imports nothing that takes long, such as numpy.
 """
 
 from __future__ import annotations
@@ -12,11 +12,9 @@ from textwrap import wrap
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from drivers.messages import Floats, LinkCounts, Pose, Twist
 from perception.detected_object import DetectedObject, MapCounts
 from runtime.cli.terminal.page_text import is_hidden, object_row, twist
 from runtime.cli.terminal.plan import draw_plan
@@ -69,13 +67,17 @@ class Snapshot:
 
     mode: str
     reason: str | None
-    pose: Pose | None
+    pose: tuple[float, float, float] | None
+    """Of the robot: x, y, m, and its direction, rad."""
     trail: list[tuple[float, float]]
-    segments: Floats
+    segments: list[tuple[float, float]]
+    """Middles of the outline segments, m."""
     map_counts: MapCounts
     objects: tuple[DetectedObject, ...]
-    ranges: Floats
-    counts: LinkCounts
+    ranges: list[float]
+    """Newest of each sensor, m; NaN and inf are no echo."""
+    line: tuple[int, int, int]
+    """Frames that arrived, bad ones, and lost ones."""
     cycles: int
     late: int
     cycle_us: Quantiles
@@ -87,8 +89,8 @@ class Snapshot:
     """Why sensors are masked."""
     place: str | None = None
     """The robot in the map frame; None where that is odometry's."""
-    twist: Twist | None = None
-    """Of the robot, by its odometry."""
+    twist: tuple[float, float] | None = None
+    """Of the robot by its odometry, m/s and rad/s."""
     console_url: str | None = None
     """Address of the operator console; None without one."""
     is_paused: bool = False
@@ -152,7 +154,7 @@ class Picture:
         head = Text.assemble((f" {name} ", STYLES.get(snapshot.mode, "bold black on yellow")))
         if snapshot.is_paused:
             head.append(" PAUSED ", style="bold black on cyan")
-        head.append("" if snapshot.twist is None else f" {twist(snapshot.twist.v, snapshot.twist.w, self._units)}")
+        head.append("" if snapshot.twist is None else f" {twist(*snapshot.twist, self._units)}")
         reason, room = snapshot.reason or "", width - len(head.plain) - 2
         url = snapshot.console_url or ""
         address = [Text(url[k : k + width], style="bold") for k in range(0, len(url), width)]
@@ -190,15 +192,15 @@ class Picture:
 
     def _is_hidden(self, seen: DetectedObject, snapshot: Snapshot) -> bool:
         radius_m = self._radii_m.get(seen.model, CORNERED_M)
-        return snapshot.pose is not None and is_hidden(seen, radius_m, snapshot.pose, snapshot.objects)
+        return snapshot.pose is not None and is_hidden(seen, radius_m, snapshot.pose[:2], snapshot.objects)
 
     def _counts(self, snapshot: Snapshot) -> list[Text]:
-        counts, took, lag = snapshot.counts, snapshot.cycle_us, snapshot.lag_us
+        (frames, bad, lost), took, lag = snapshot.line, snapshot.cycle_us, snapshot.lag_us
         rows = [("ring", self._ring(snapshot.ranges)), ("map", map_text(snapshot.map_counts))]
         if snapshot.place is not None:
             rows.append(("place", snapshot.place))
         rows += [
-            ("line", f"{counts.frames} frames, {counts.bad} bad, {counts.lost} lost"),
+            ("line", f"{frames} frames, {bad} bad, {lost} lost"),
             ("cycle", f"{snapshot.cycles}, {snapshot.late} late, {snapshot.missed} missed; takes {millis(took)}"),
             ("", f"begins {millis(lag)} after it is due"),
         ]
@@ -207,12 +209,12 @@ class Picture:
             rows.append(("late by", ", ".join(f"{cause}: {count}" for cause, count in worst)))
         return [Text(f"{name:<8}{value}") for name, value in rows]
 
-    def _ring(self, ranges: Floats) -> str:
+    def _ring(self, ranges: list[float]) -> str:
         """Return a bar per sensor, higher for a nearer echo, or a dot without an echo."""
         bars = []
         for r in ranges:
-            near = 0.0 if not np.isfinite(r) else 1.0 - min(float(r) / self._reach_m, 1.0)
-            bars.append("·" if not np.isfinite(r) else BARS[max(1, round(near * (len(BARS) - 1)))])
+            near = 0.0 if not math.isfinite(r) else 1.0 - min(r / self._reach_m, 1.0)
+            bars.append("·" if not math.isfinite(r) else BARS[max(1, round(near * (len(BARS) - 1)))])
         return "".join(bars)
 
 

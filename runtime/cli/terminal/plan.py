@@ -8,7 +8,6 @@ from typing import Final
 
 from rich.text import Text
 
-from drivers.messages import Floats, Pose
 from perception.detected_object import DetectedObject
 
 ARROWS: Final = "→↗↑↖←↙↓↘"
@@ -106,9 +105,9 @@ class Plan:
 
 
 def draw_plan(
-    pose: Pose,
+    pose: tuple[float, float, float],
     trail: list[tuple[float, float]],
-    segments: Floats,
+    segments: list[tuple[float, float]],
     objects: tuple[DetectedObject, ...],
     size_m: dict[str, float],
     columns: int,
@@ -118,12 +117,12 @@ def draw_plan(
 
     Parameters
     ----------
-    pose : Pose
-        Of the robot.
+    pose : (x, y, theta)
+        Of the robot, m and rad.
     trail : list of (x, y)
         Earlier positions, m.
-    segments : (n, 5) float
-        Outline segments: end points x, y, x, y (m), direction of the normal (rad).
+    segments : list of (x, y)
+        Middles of the outline segments, m.
     objects : tuple of DetectedObject
         Recognised objects.
     size_m : dict
@@ -131,9 +130,8 @@ def draw_plan(
     columns, rows : int
         Size in characters.
     """
-    middles = 0.5 * (segments[:, 0:2] + segments[:, 2:4])
-    places = [(float(x), float(y)) for x, y in middles]
-    plan = Plan([*trail, (pose.x, pose.y), *((o.x, o.y) for o in objects), *places], columns, rows)
+    robot_x, robot_y, theta = pose
+    plan = Plan([*trail, (robot_x, robot_y), *((o.x, o.y) for o in objects), *segments], columns, rows)
     for x, y in trail:
         plan.mark(x, y, "·", "dim")
     for seen in objects:
@@ -141,10 +139,10 @@ def draw_plan(
             plan.line(*seen.ends, "=", "green")
             continue
         plan.circle(seen.x, seen.y, size_m.get(seen.model, 0.3), "o", "green")
-    for x, y in places:
+    for x, y in segments:
         plan.mark(x, y, "•", "yellow")
     for index, seen in enumerate(objects, 1):
         plan.mark(seen.x, seen.y, str((seen.number or index) % 10), "bold green")
-    eighth = round(pose.theta / (math.pi / 4)) % 8
-    plan.mark(pose.x, pose.y, ARROWS[eighth], "bold cyan")
+    eighth = round(theta / (math.pi / 4)) % 8
+    plan.mark(robot_x, robot_y, ARROWS[eighth], "bold cyan")
     return plan.text()

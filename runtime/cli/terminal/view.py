@@ -110,19 +110,22 @@ class View:
         is_new, self._mode = record.mode.mode is not self._mode, record.mode.mode
         if record.cycle % EVERY_CYCLES and not is_new:
             return
-        pose = None if state.odometry is None else state.odometry.pose
+        odometry = state.odometry
+        pose, twist = (None, None) if odometry is None else (odometry.pose, odometry.twist)
         if pose is not None:
             self._trail.append((pose.x, pose.y))
-        localized = state.perception.localized()
+        localized, segments, counts = state.perception.localized(), state.perception.segment_geometry(), driver.counts
+        middles = 0.5 * (segments[:, 0:2] + segments[:, 2:4])
         later: Quantiles = {"p50": 0.0, "p99": 0.0, "max": 0.0}  # see `_completed`
         self._slot = Snapshot(
-            record.mode.mode.value, state.hold_reason or record.mode.reason or state.preparing, pose,
-            list(self._trail), state.perception.segment_geometry(), state.perception.counts,
-            state.perception.labelled_objects(), self._ranges.copy(), driver.counts,
+            record.mode.mode.value, state.hold_reason or record.mode.reason or state.preparing,
+            None if pose is None else (pose.x, pose.y, pose.theta), list(self._trail),
+            [(x, y) for x, y in middles.tolist()], state.perception.counts,
+            state.perception.labelled_objects(), self._ranges.tolist(), (counts.frames, counts.bad, counts.lost),
             stats.cycles, stats.late, later, later, stats.missed, tuple(stats.causes.items()),
             tuple(report.reason for report in state.perception.sensor_reports()),
             None if localized is None else localized_place(localized, self._scale.units),
-            None if state.odometry is None else state.odometry.twist, self.console_url,
+            None if twist is None else (twist.v, twist.w), self.console_url,
         )  # fmt: skip
         self._stats = stats
         self._wake.set()

@@ -15,7 +15,6 @@ from typing import Any
 import pytest
 from playwright._impl._driver import compute_driver_executable
 
-from drivers.messages import Pose
 from perception.detected_object import DetectedObject
 from runtime import console as page_folder
 from runtime.cli.terminal import page_text
@@ -106,8 +105,8 @@ def test_what_a_wall_hides_is_what_it_hides_on_the_page(measured: Callable[[str]
         covariance = (along * c * c, along * c * s, along * s * s)
         wall = DetectedObject("wall", x, y, theta, 0.1, 9, 0.9, 0.9, covariance)
         seen = DetectedObject("drum", ox, oy, 0.0, 0.1, 9, 0.9, 0.9)
-        ours.append(page_text.is_hidden(seen, radius, Pose(rx, ry, 0.0), (wall, seen)))
-        assert not page_text.is_hidden(wall, 0.1, Pose(rx, ry, 0.0), (wall, wall))
+        ours.append(page_text.is_hidden(seen, radius, (rx, ry), (wall, seen)))
+        assert not page_text.is_hidden(wall, 0.1, (rx, ry), (wall, wall))
     assert printed(script) == ours
     assert 20 < sum(ours) < 280
     measured(f"{len(ours)} scenes of a wall and an object: hidden in {sum(ours)}, as by the page's code")

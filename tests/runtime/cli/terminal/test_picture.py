@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import math
+import subprocess
 from dataclasses import replace
 
 import numpy as np
@@ -10,16 +12,16 @@ import pytest
 from rich.console import Console
 
 from config.load import load_settings
-from drivers.messages import Floats, LinkCounts, Pose, Twist
+from drivers.messages import Pose
 from perception.detected_object import DetectedObject, MapCounts
 from perception.localization.localized_pose import LocalizedPose
 from runtime.cli.terminal.page_text import localized_place
 from runtime.cli.terminal.picture import CORNERED_M, Picture, Scale, Snapshot
+from runtime.support.child_process import INTERPRETER, child_environment
 
 SETTINGS = load_settings("hallway")
-NO_SEGMENTS: Floats = np.zeros((0, 5))
 EMPTY = Snapshot(
-    "CONNECTING", None, None, [], NO_SEGMENTS, MapCounts(0, 0, 0), (), np.full(24, np.nan), LinkCounts(), 0, 0,
+    "CONNECTING", None, None, [], [], MapCounts(0, 0, 0), (), [math.nan] * 24, (0, 0, 0), 0, 0,
     {"p50": 0.0, "p99": 0.0, "max": 0.0}, {"p50": 0.0, "p99": 0.0, "max": 0.0},
 )  # fmt: skip
 
@@ -50,11 +52,11 @@ def test_a_picture_shows_mode_reason_objects_ring_and_numbers() -> None:
     snapshot = replace(
         EMPTY,
         mode="SAFE_STOP", reason="bumper contact: free the robot, then re-arm",
-        pose=Pose(1.0, 0.0, 0.0), trail=[(0.0, 0.0)], segments=np.array([[0.9, 1.0, 1.1, 1.0, 0.0]]),
+        pose=(1.0, 0.0, 0.0), trail=[(0.0, 0.0)], segments=[(1.0, 1.0)],
         map_counts=MapCounts(1, 1, 7, 12, 3),
         objects=(seen(0.3048, 1.2192),),
-        ranges=np.array([np.nan, np.inf, 0.0, SETTINGS.ring.range_max_m] + [1.0] * 20),
-        counts=LinkCounts(1832, 3, 2), cycles=520, late=9,
+        ranges=[math.nan, math.inf, 0.0, SETTINGS.ring.range_max_m, *[1.0] * 20],
+        line=(1832, 3, 2), cycles=520, late=9,
         cycle_us={"p50": 478.0, "p99": 2961.0, "max": 5958.0}, lag_us={"p50": 907.0, "p99": 5415.0, "max": 8954.0},
         missed=4, faults=(("refine", 2), ("outside the process", 7)),
     )  # fmt: skip
@@ -73,15 +75,15 @@ URL = "http://127.0.0.1:8374/?token=qT3xYw0s1uBhVJYkz0cH4nR2mFpL8dXe"
 BUSY = replace(
     EMPTY,
     mode="SAFE_STOP", reason="no echoes for 0.6 s: check the ring's power and cable; then re-arm",
-    pose=Pose(1.0, 0.0, 0.0), trail=[(0.1 * k, 0.0) for k in range(40)],
-    segments=np.array([[0.9, 1.0 + 0.1 * k, 1.1, 1.0, 0.0] for k in range(30)]), map_counts=MapCounts(304, 9, 7),
+    pose=(1.0, 0.0, 0.0), trail=[(0.1 * k, 0.0) for k in range(40)],
+    segments=[(1.0, 1.0 + 0.05 * k) for k in range(30)], map_counts=MapCounts(304, 9, 7),
     objects=(
         DetectedObject("semicircle", -1.005, 1.2192, 0.5, 0.0123, 39, 0.999, 0.999, number=3),
         DetectedObject("wall", 3.0, 2.0, 0.0, 0.9, 50, 0.97, 0.97, (3.0, 0.0, 0.0), 12, sigma_theta=0.01),
         *(DetectedObject("post", 0.2 * k, 3.0, 0.0, 0.02, 12, 0.8, 0.8, number=20 + k) for k in range(14)),
     ),
-    sensors=("sensor 4 has been silent for 30 s", "sensor 9 repeats 0.91 m"), counts=LinkCounts(1832, 3, 2),
-    cycles=520, late=9, faults=(("refine", 2),), twist=Twist(-0.2, -0.1),
+    sensors=("sensor 4 has been silent for 30 s", "sensor 9 repeats 0.91 m"), line=(1832, 3, 2),
+    cycles=520, late=9, faults=(("refine", 2),), twist=(-0.2, -0.1),
 )  # fmt: skip
 
 
@@ -137,3 +139,18 @@ def test_the_place_in_the_map_is_shown_and_that_it_is_unknown() -> None:
     assert "10.00, 1.00 ± 0.066 ft, 180° ± 0.6°, tracking 97 %" in printed(
         replace(EMPTY, place=localized_place(known, "ft"))
     )
+
+
+def test_the_process_that_draws_imports_nothing_that_takes_long() -> None:
+    """It starts with the run: with numpy, pydantic and numba it took half a second of processor time from it."""
+    program = "import sys, runtime.cli.terminal.__main__; print(*sorted(m for m in sys.modules if '.' not in m))"
+    done = subprocess.run(
+        [*INTERPRETER, "-c", program],
+        env=child_environment(),
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=600,
+    )
+    slow = {"numpy", "pydantic", "numba", "asyncio", "drivers", "aiohttp", "structlog", "cyclopts"}
+    assert not slow & set(done.stdout.split())

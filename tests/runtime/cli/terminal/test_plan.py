@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
+
 import pytest
 
-from drivers.messages import Floats, Pose
 from perception.detected_object import DetectedObject
 from runtime.cli.terminal.plan import ARROWS, MARGIN_M, Plan, draw_plan
 
-NO_SEGMENTS: Floats = np.zeros((0, 5))
+START = (0.0, 0.0, 0.0)
 
 
 def seen(x: float, y: float, model: str = "semicircle") -> DetectedObject:
     return DetectedObject(model, x, y, 0.5, 0.01, 39, 0.9)
 
 
-def rows(pose: Pose, *, trail: list[tuple[float, float]] | None = None, segments: Floats = NO_SEGMENTS,
-         objects: tuple[DetectedObject, ...] = ()) -> list[str]:  # fmt: skip
-    return draw_plan(pose, trail or [], segments, objects, {"semicircle": 0.3048}, 60, 20).plain.split("\n")
+def rows(
+    pose: tuple[float, float, float] = START,
+    *,
+    trail: list[tuple[float, float]] | None = None,
+    segments: list[tuple[float, float]] | None = None,
+    objects: tuple[DetectedObject, ...] = (),
+) -> list[str]:
+    return draw_plan(pose, trail or [], segments or [], objects, {"semicircle": 0.3048}, 60, 20).plain.split("\n")
 
 
 def where(lines: list[str], character: str) -> list[tuple[int, int]]:
@@ -26,7 +31,7 @@ def where(lines: list[str], character: str) -> list[tuple[int, int]]:
 
 
 def test_the_plan_has_its_size_and_x_right_and_y_up() -> None:
-    lines = rows(Pose(0.0, 0.0, 0.0), trail=[(-1.0, 0.0)], objects=(seen(2.0, 1.0), seen(2.0, -1.0)))
+    lines = rows(trail=[(-1.0, 0.0)], objects=(seen(2.0, 1.0), seen(2.0, -1.0)))
     assert [len(line) for line in lines] == [60] * 20 + [0]
     ((robot_row, robot_column),) = where(lines, "→")
     ((first_row, first_column),) = where(lines, "1")
@@ -38,7 +43,7 @@ def test_the_plan_has_its_size_and_x_right_and_y_up() -> None:
 
 
 def test_objects_are_rings_of_their_size() -> None:
-    lines = rows(Pose(0.0, 0.0, 0.0), objects=(seen(2.0, 0.0),))
+    lines = rows(objects=(seen(2.0, 0.0),))
     marks = [j for _, j in where(lines, "o")]
     plan = Plan([(0.0, 0.0), (2.0, 0.0)], 60, 20)
     assert (max(marks) - min(marks)) * plan.cell_m == pytest.approx(2 * 0.3048, abs=2 * plan.cell_m)
@@ -46,9 +51,8 @@ def test_objects_are_rings_of_their_size() -> None:
     assert (max(rows_of) - min(rows_of)) * 2 * plan.cell_m == pytest.approx(2 * 0.3048, abs=4 * plan.cell_m)
 
 
-def test_segments_are_marked_at_their_middles() -> None:
-    segments = np.array([[0.9, 1.0, 1.1, 1.0, 0.0], [1.9, -1.0, 2.1, -1.0, 0.0]])
-    lines = rows(Pose(0.0, 0.0, 0.0), segments=segments)
+def test_segments_are_marked() -> None:
+    lines = rows(segments=[(1.0, 1.0), (2.0, -1.0)])
     (upper, lower) = where(lines, "•")
     assert upper[0] < where(lines, "→")[0][0] < lower[0]
     assert upper[1] < lower[1]
@@ -56,12 +60,12 @@ def test_segments_are_marked_at_their_middles() -> None:
 
 def test_the_arrow_points_where_the_wheels_drive() -> None:
     for eighth in range(-9, 10):
-        lines = rows(Pose(0.0, 0.0, eighth * np.pi / 4 + 0.1))
+        lines = rows((0.0, 0.0, eighth * math.pi / 4 + 0.1))
         assert len(where(lines, ARROWS[eighth % 8])) == 1, eighth
 
 
 def test_the_robot_is_on_top_and_what_is_outside_is_left_out() -> None:
-    lines = rows(Pose(1.0, 0.0, 0.0), trail=[(1.0, 0.0)], objects=(seen(1.0, 0.0),))
+    lines = rows((1.0, 0.0, 0.0), trail=[(1.0, 0.0)], objects=(seen(1.0, 0.0),))
     assert len(where(lines, "→")) == 1
     assert where(lines, "1") == []
     plan = Plan([(0.0, 0.0)], 10, 5)

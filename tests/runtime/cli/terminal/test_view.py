@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import io
+import math
 import os
+import pickle
 import pty
 import select
 import signal
@@ -14,12 +16,10 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import numpy as np
 import pytest
 from rich.console import Console
 
 from config.load import load_settings
-from drivers.messages import Floats, LinkCounts
 from drivers.registry import make_driver
 from perception.detected_object import MapCounts
 from runtime.cli.terminal import view
@@ -31,9 +31,8 @@ from runtime.timing.cycle_stats import CycleStats
 from tests.hil.machine import TIMEOUT_S
 
 SETTINGS = load_settings("hallway")
-NO_SEGMENTS: Floats = np.zeros((0, 5))
 EMPTY = Snapshot(
-    "CONNECTING", None, None, [], NO_SEGMENTS, MapCounts(0, 0, 0), (), np.full(24, np.nan), LinkCounts(), 0, 0,
+    "CONNECTING", None, None, [], [], MapCounts(0, 0, 0), (), [math.nan] * 24, (0, 0, 0), 0, 0,
     {"p50": 0.0, "p99": 0.0, "max": 0.0}, {"p50": 0.0, "p99": 0.0, "max": 0.0},
 )  # fmt: skip
 
@@ -102,6 +101,14 @@ def test_a_drive_is_drawn_by_another_process(terminal: Terminal) -> None:
         terminal.until("a line above it")
     until(lambda: all(thread.name != "view" for thread in threading.enumerate()))
     terminal.until("\x1b[?25h")  # the cursor is shown again
+    terminal.view._mode = None  # the next cycle is drawn
+    terminal.view.on_cycle(records[-1], run.state, stats, driver)
+    snapshot = terminal.view._slot
+    assert snapshot is not None
+    assert snapshot.objects
+    message = pickle.dumps(terminal.view._completed(snapshot))
+    assert b"numpy" not in message, "or the other process imports it"
+    assert b"drivers" not in message
 
 
 def test_a_terminal_that_shows_nothing_delays_no_cycle(terminal: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
