@@ -96,6 +96,10 @@ class Mode(Enum):
     FAULT = "FAULT"
 
 
+NEVER_ARMED: Final = frozenset({Mode.CONNECTING, Mode.READY})
+"""Modes from which a run that is to arm the robot once does so, as soon as the line works."""
+
+
 @dataclass(frozen=True, slots=True)
 class ModeState:
     """A mode with its reason, and the progress of arming."""

@@ -35,7 +35,7 @@ from runtime.cycle.logs.alerts import Alerts
 from runtime.cycle.logs.line_log import LineLog
 from runtime.cycle.logs.mode_log import ModeLog
 from runtime.cycle.logs.object_log import ObjectLog
-from runtime.cycle.modes import Mode, ModeState
+from runtime.cycle.modes import NEVER_ARMED, Mode, ModeState
 from runtime.cycle.preparation import Preparation, RunningPreparation, fresh_state
 from runtime.cycle.step import Command, CycleRecord, State, apply_command, apply_settings, step
 from runtime.cycle.summary import RunSummary, run_summary
@@ -297,7 +297,7 @@ class RobotProcess:
 
     def _gather(self, run_s: float, host_s: float, echo_age_s: float | None = None) -> Inputs:
         """Return what the robot sent and the operator requested since the last cycle."""
-        if self._arm_when_ready and self._state.mode.mode is Mode.READY:
+        if self._arm_when_ready and self._driver.state is LineState.READY and self._state.mode.mode in NEVER_ARMED:
             self._arm_when_ready = False
             self.request(Request.ARM)
         request = self._request if self._is_request_valid() else None

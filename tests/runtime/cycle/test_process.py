@@ -17,7 +17,7 @@ from drivers.messages import Flags
 from perception.edits import Edit, PlaceModel
 from runtime.cycle.drive_requests import Legs
 from runtime.cycle.inputs import Request
-from runtime.cycle.modes import Mode
+from runtime.cycle.modes import ARMING_MIN_S, Mode
 from runtime.cycle.process import EDITS_MAX, EDITS_PER_CYCLE, Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.timing.cycle_stats import CycleStats
@@ -158,6 +158,30 @@ def test_a_robot_that_an_earlier_run_left_latched_is_released_and_driven(monkeyp
             assert robot.truth.flags & Flags.LATCHED
             assert robot.truth.twist.v == 0.0
     assert [event["mode"] for event in log.events if event["event"] == "mode"] == 2 * ["READY", "DRIVE"]
+
+
+def test_the_first_cycle_arms_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each cycle that passes before is a twentieth of a second of every start."""
+    begins_s, modes = list[float](), list[Mode]()
+
+    def on_cycle(record: CycleRecord, *_: State | CycleStats | RobotDriver) -> None:
+        begins_s.append(record.inputs.run_s)
+        modes.append(record.mode.mode)
+
+    with in_virtual_time(monkeypatch) as (loop, settings, _robot, _links):
+        process = RobotProcess(settings, Log().log, Observers(on_cycle), loop.time)
+        loop.run_until_complete(process.run(arm=True, seconds=0.5))
+    assert modes[0] is Mode.READY
+    period_s = 1.0 / settings.cycle.rate_hz
+    assert begins_s[modes.index(Mode.DRIVE)] - begins_s[0] <= ARMING_MIN_S + period_s + 1e-6
+
+
+def test_a_halt_before_the_first_cycle_counts_more_than_arming(monkeypatch: pytest.MonkeyPatch) -> None:
+    with in_virtual_time(monkeypatch) as (loop, settings, _robot, _links):
+        process = RobotProcess(settings, Log().log, clock=loop.time)
+        process.request(Request.HALT)
+        summary = loop.run_until_complete(process.run(arm=True, seconds=0.5))
+    assert summary["mode"] == "SAFE_STOP"
 
 
 def test_without_an_arm_it_stays_in_ready(monkeypatch: pytest.MonkeyPatch) -> None:
