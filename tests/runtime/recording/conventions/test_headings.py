@@ -95,7 +95,7 @@ def test_echoes_agree_as_well_far_from_the_origin_and_beside_a_glitch(drive: Dri
     scores = echo_scores(table, drive.settings, choices, 1.0, 1.0)
     glitch = table.pose.copy()
     glitch[40, :2] = 1e300, -1e300
-    for pose in (table.pose + [5e5, 4e6, 0.0, 0.0], glitch):
+    for pose in (table.pose + np.array([5e5, 4e6, 0.0, 0.0]), glitch):
         moved = echo_scores(table._replace(pose=pose), drive.settings, choices, 1.0, 1.0)
         expected = sureness(scores[choices[0]], scores[choices[1]])
         assert sureness(moved[choices[0]], moved[choices[1]]) == pytest.approx(expected, rel=0.01)
