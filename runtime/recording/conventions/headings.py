@@ -249,8 +249,8 @@ def nearness(px: Floats, py: Floats, x: Floats, y: Floats, kernel_m: float) -> N
     kernel_m : float
         Width w of an echo's density.
     """
-    px, py, x, y = (np.clip(each / kernel_m, -FAR, FAR).astype(np.float32) for each in (px, py, x, y))
-    spread, across = np.subtract.outer(px, x), np.subtract.outer(py, y)
+    px1, py1, x1, y1 = (np.clip(each / kernel_m, -FAR, FAR).astype(np.float32) for each in (px, py, x, y))
+    spread, across = np.subtract.outer(px1, x1), np.subtract.outer(py1, y1)
     spread *= spread
     across *= across
     spread += across
