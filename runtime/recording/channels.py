@@ -117,6 +117,7 @@ def _ending_at_first_error(schema: Any) -> Any:  # noqa: ANN401 - a tree of dict
     return schema
 
 
+@functools.cache
 def schema_of(kind: type[Payload]) -> bytes:
     """Return the JSON schema of what `encode` writes for a payload type."""
     return orjson.dumps(kind.model_json_schema(mode="serialization", schema_generator=PayloadSchema))

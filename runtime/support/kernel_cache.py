@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import functools
 import hashlib
 import os
 import shutil
@@ -83,8 +84,13 @@ OTHERS_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
 
 def kernels_key() -> str:
     """Return a digest of everything that compiled kernels may depend on: the sources, Python, numba and numpy."""
-    compiler = [os.environ.get(name, "") for name in ("NUMBA_BOUNDSCHECK", "NUMBA_OPT")]
-    digest = hashlib.sha256(f"{sys.version}{version('numba')}{version('numpy')}{compiler}".encode())
+    return _key(*(os.environ.get(name, "") for name in ("NUMBA_BOUNDSCHECK", "NUMBA_OPT")))
+
+
+@functools.cache
+def _key(*compiler: str) -> str:
+    """Return the digest for these settings of the compiler; a start asks four times, and reading takes 7 ms."""
+    digest = hashlib.sha256(f"{sys.version}{version('numba')}{version('numpy')}{list(compiler)}".encode())
     for package in PACKAGES:
         spec = find_spec(package)
         for place in spec.submodule_search_locations or () if spec else ():

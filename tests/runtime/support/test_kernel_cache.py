@@ -31,7 +31,8 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def packages(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Put two packages in place of the real ones; return a source of the second."""
+    """Put two packages in place of the real ones, read at each call; return a source of the second."""
+    monkeypatch.setattr(kernels, "_key", kernels._key.__wrapped__)
     for name in kernels.PACKAGES:
         (folder / name).mkdir(parents=True)
         (folder / name / "a.py").write_text("X = 1\n")
