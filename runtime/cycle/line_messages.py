@@ -17,6 +17,9 @@ from drivers.driver import LineState
 HARDWARE: Final = re.compile(r"\b(cable|power|plug|plugged|unplugged|restart the robot|emergency switch)\b")
 """What the other end lacks if it is a program."""
 
+EXCESS: Final = re.compile(r"\b(many|more|corrupt)\b")
+"""What a program that is stopped or late does not cause."""
+
 PSEUDO_TERMINALS: Final = "/dev/pts/"
 
 
@@ -66,7 +69,11 @@ class ProgramLine:
     def message(self, text: str) -> str:
         """Return the message; where it names hardware, cause and action are the program's."""
         what, _, rest = text.partition("; ")
-        return f"{what}; {self._cause(is_closed=False)}" if HARDWARE.search(rest) else text
+        if not HARDWARE.search(rest):
+            return text
+        if EXCESS.search(what) and not self.has_ended():
+            return f"{what}; {self.program} is faulty, or its faults file asks for this: {self.action}"
+        return f"{what}; {self._cause(is_closed=False)}"
 
     def problem(self, state: LineState, text: str | None) -> str | None:
         """Return why the line is not ready."""

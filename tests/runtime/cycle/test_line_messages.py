@@ -18,7 +18,9 @@ from drivers.driver import LineState
 from drivers.emulator.faults import Fault, Mute
 from drivers.heard_bytes import HeardBytes
 from drivers.rflex import diagnostics as rflex
+from drivers.stamper import EXCESS_FIRINGS
 from runtime.cycle.line_messages import HARDWARE, ROBOT_LINE, ProgramLine, messages_on
+from runtime.cycle.logs.line_log import CORRUPT, TOO_MANY
 from runtime.cycle.modes import Mode
 from runtime.cycle.process import RobotProcess
 from tests.runtime.virtual_time import in_virtual_time
@@ -60,8 +62,15 @@ def test_what_happened_stays_and_cause_and_action_are_the_emulator_s(text: str) 
     assert HARDWARE.search(text), "as of a robot"
     assert ROBOT_LINE.problem(LineState.DOWN, text) == text
     said = EMULATOR.problem(LineState.DOWN, text) or ""
-    assert said.startswith(text.partition(";")[0] + "; the emulator is stopped or late")
+    is_late = "corrupt" not in text
+    assert said.startswith(text.partition(";")[0] + f"; the emulator is {'stopped or late' if is_late else 'faulty'}")
     assert not HARDWARE.search(said)
+
+
+@pytest.mark.parametrize("text", [EXCESS_FIRINGS, TOO_MANY.format(3000.0), CORRUPT.format(0.3, 30.0)])
+def test_a_program_that_sends_too_much_is_not_late(text: str) -> None:
+    said = EMULATOR.message(text)
+    assert said.startswith(text.partition(";")[0] + "; the emulator is faulty, or its faults file asks for this")
 
 
 @pytest.mark.parametrize("text", SETTINGS)
