@@ -29,6 +29,7 @@ def settings_of(method: str, grid: str, place: str) -> Settings:
     return with_known_room(settings, "hallway") if place == "room" else settings
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize(("method", "grid", "place"), [*itertools.product(METHODS, GRIDS, PLACES)])
 def test_each_number_has_a_bound_and_each_bound_a_number(method: str, grid: str, place: str) -> None:
     """A field without a bound ends every replay from a keyframe: declare one as `perception.bounds` says."""

@@ -72,7 +72,7 @@ def test_further_readings_of_an_unchanged_room_change_nothing(model: Reflection,
     ring = ring_of_room(seed)
     perception = Perception(ring, SETTINGS.models, SETTINGS.perception)
     before, compared = None, 0
-    for firing in Wandering(ring, seed, 30.0, 40.0, acoustics=AcousticsConfig(model=model)).firings():
+    for firing in Wandering(ring, seed, 30.0, 20.0, acoustics=AcousticsConfig(model=model)).firings():
         perception.observe(firing)
         while perception.can_refine and perception.refine():
             pass

@@ -48,7 +48,7 @@ def test_the_chunks_are_those_of_the_stock_reader(small: bytes) -> None:
 @pytest.mark.compiled
 def test_a_file_cut_off_anywhere_gives_every_complete_chunk(small: bytes) -> None:
     ends = [end for _, end in chunks_at(small)]
-    for cut in [*range(0, ends[-1] + 50, 3), *range(ends[-1] + 50, len(small), 101)]:  # beyond is the index
+    for cut in [*range(0, ends[-1] + 50, 11), *range(ends[-1] + 50, len(small), 101)]:  # beyond is the index
         chunks, scanner = scanned(small[:cut])
         assert len(chunks) == sum(end <= cut for end in ends), cut
         assert not scanner.finished
@@ -63,7 +63,7 @@ def test_one_flipped_bit_costs_a_chunk_at_most_and_is_reported(small: bytes) -> 
     rng = random.Random(0)
     heads = {at + k for begin, end in chunks_at(small) for at in (begin, end) for k in range(-8, 60)}
     index = chunks_at(small)[-1][1] + 60
-    for at in sorted(heads | {*range(60), *range(60, index, 7), *range(index, len(small), 61)}):
+    for at in sorted(heads | {*range(60), *range(60, index, 29), *range(index, len(small), 199)}):
         data = bytearray(small)
         data[at] ^= 1 << rng.randrange(8)
         chunks, scanner = scanned(bytes(data))

@@ -230,7 +230,9 @@ def test_every_poisoned_number_is_refused_or_harmless(
     """Replay what is not refused: where array bounds are checked all whole numbers, which may be indices, and a share
     of the others, another one in each moment; elsewhere every seventh field, to end no process."""
     found = Counter[str]()
-    for at, moment in enumerate(reversed(moments.values())):
+    cycles = 7 if share == 1 else 4  # in which each sensor of a ring that fires in octets is heard every second time
+    for at, whole in enumerate(reversed(moments.values())):
+        moment = whole._replace(following=whole.following[:cycles])
         assert not ends_in_error(moment, moment.snapshot)
         replayed = {
             name

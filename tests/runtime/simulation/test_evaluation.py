@@ -141,7 +141,7 @@ def test_the_same_seed_gives_the_same_outcome_and_another_seed_another(held_out:
 @pytest.mark.compiled
 def test_a_robot_that_does_not_come_through_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wall across the hallway."""
-    monkeypatch.setattr("runtime.simulation.evaluation.SECONDS_MAX", 40.0)
+    monkeypatch.setattr("runtime.simulation.evaluation.SECONDS_MAX", 20.0)
     settings, world = settings_of("hallway")
     wall = {"wall": [{"x1_m": 0.5, "y1_m": -9.0, "x2_m": 0.5, "y2_m": 9.0}]}
     shut = WorldConfig.model_validate({**world.model_dump(), **wall})

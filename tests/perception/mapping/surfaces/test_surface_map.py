@@ -261,7 +261,8 @@ def test_each_number_has_a_bound_within_which_it_is_harmless(moments: list[Surfa
         for k, moment in enumerate(moments)
         for i, (name, values) in enumerate(numbers_of(snapshot_of(moment)), k)
         if values.dtype.kind != "b" and not bounds[name].constant
-        # A whole number may be an index. Of the others one end is tried in this moment, the other one in the next.
-        for number in (bounds[name][:2] if values.dtype.kind != "f" else bounds[name][i % 2 : i % 2 + 1])
+        # A whole number may be an index. Of the others one end is tried in every fourth moment, the other two later.
+        if values.dtype.kind != "f" or i % 2 == 0
+        for number in (bounds[name][:2] if values.dtype.kind != "f" else (bounds[name][i // 2 % 2],))
     ]
     assert outcomes.count(True) < 0.1 * len(outcomes)
