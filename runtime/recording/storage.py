@@ -40,6 +40,11 @@ PART_SHARE: Final = 0.25
 class RecordingTarget(Protocol):
     """Where the files of one recording are written."""
 
+    @property
+    def place(self) -> Path:
+        """The file or the folder, for messages."""
+        ...
+
     def begin_part(self, part: int) -> Path:
         """Return the path of the next file, numbered from 1, and see to it that it can be written there."""
         ...
@@ -73,6 +78,11 @@ class SingleFile:
     """A file named by the user. After a disk error, recording continues in `NAME-2.mcap` and so on next to it."""
 
     first: Path
+
+    @property
+    def place(self) -> Path:
+        """The file."""
+        return self.first
 
     def begin_part(self, part: int) -> Path:
         """Return the path of a file, numbered from 1: the first as the user named it, a later one is created.
@@ -149,6 +159,11 @@ class RotatingFolder:
     _own_removed_bytes: int = 0
     _announced: Path | None = None
     """The file that the last check has named."""
+
+    @property
+    def place(self) -> Path:
+        """The folder."""
+        return self.folder
 
     def begin_part(self, part: int) -> Path:
         """Create a file, numbered from 1, and return its path; it counts as one of this run.

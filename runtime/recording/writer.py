@@ -220,7 +220,7 @@ class RecordingWriter:
         try:
             act()
         except OSError as error:
-            where = self._status.file if self._file is not None else str(error.filename)
+            where = self._status.file if self._file is not None else error.filename or self._target.place
             self._abandon(f"{where}: {error.strerror or error}")
 
     def _abandon(self, error: str) -> None:

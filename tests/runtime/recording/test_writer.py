@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -23,7 +24,7 @@ from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, RUN_INFO, SERI
 from runtime.recording.reader import open_recording
 from runtime.recording.recorder import BOOKMARK_MAX, Recorder, run_info
 from runtime.recording.schema import Bookmark, SerialBytes
-from runtime.recording.storage import SingleFile
+from runtime.recording.storage import RotatingFolder, SingleFile
 from runtime.recording.writer import RecorderStatus, RecordingWriter
 from runtime.simulation.closed_loop import simulate
 from tests.recorded import entries_of, hall, record, until, verify_file
@@ -98,6 +99,21 @@ def test_bytes_that_a_failed_file_loses_are_counted_and_not_in_the_next_one(tmp_
         if e.topic == SERIAL["in"]
     ]
     assert found == [[(12.0, b"c")]]
+
+
+def test_a_disk_that_is_full_before_the_first_byte_is_named_by_its_place(tmp_path: Path) -> None:
+    """It was "None: No space left on device"."""
+
+    def fail() -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    for target in (
+        SingleFile(tmp_path / "run.mcap"),
+        RotatingFolder(tmp_path, "run", load_settings("hallway").recording),
+    ):
+        writer = RecordingWriter(target, run_info(hall(), lambda: 0.0, emulated=False))
+        writer._guarded(fail)
+        assert writer.status.last_error == f"{target.place}: No space left on device"
 
 
 def test_off_from_the_beginning_leaves_nothing(tmp_path: Path) -> None:
