@@ -343,12 +343,12 @@ class RobotProcess:
     def _fail(self, error: Exception) -> None:
         """Halt before anything else, then enter FAULT, which is never left, and log the error."""
         self._halt()
-        what = f"the cycle failed ({describe_exception(error)})"
-        likely = f"{what}, likely through a program error: see the log, then restart the program"
-        reason = str(error) if isinstance(error, UserError) else likely
+        is_known, what = isinstance(error, UserError), f"the cycle failed ({describe_exception(error)})"
+        reason = str(error) if is_known else f"{what}, likely through a program error: see the log, then restart it"
         self._state.mode = self._state.mode.enter(Mode.FAULT, self._clock(), reason)
         self._mode_log.entered(self._state, self._clock())
-        self._log.error("the cycle failed", exc_info=error)
+        if not is_known:
+            self._log.error("the cycle failed", exc_info=error)
 
     def _carry_out(self, command: Command, stale_run_s: float) -> None:
         """Send the command, but no velocity after `stale_run_s`: the next cycle stops the drive for such a gap."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import signal
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from types import MappingProxyType
@@ -219,8 +220,7 @@ class KernelPreparation:
             self._output = asyncio.create_task(self._process.communicate(), name="output of the compiler")
         while uncompiled_parts(self._folder, self._parts):
             if self._output is None or self._output.done():
-                words = [] if self._output is None else self._output.result()[1].decode(errors="replace").splitlines()
-                why = f" ({one_line(words[-1])})" if words else ""
+                why = self._why_ended()
                 raise UserError(
                     f"recognition could not be prepared: its kernels were not compiled into {self._folder}{why}, "
                     "likely for lack of memory or disk space; make room, then start again",
@@ -232,6 +232,15 @@ class KernelPreparation:
         for number, part in enumerate(self._parts, 1):
             self.progress = f"{PREPARING}: its kernels are being loaded, part {number} of {len(self._parts)}"
             await asyncio.to_thread(warm_up, settings, [part])
+
+    def _why_ended(self) -> str:
+        """Return how the compiling process ended, in brackets; empty if that is not known."""
+        if self._process is None or self._output is None:
+            return ""
+        if (code := self._process.returncode or 0) < 0:
+            return f" (the process that compiled them was ended by {signal.Signals(-code).name})"
+        words = self._output.result()[1].decode(errors="replace").splitlines()
+        return f" ({one_line(words[-1])})" if words else ""
 
     def _compiled(self) -> int:
         """Return how many kernels are compiled: a folder of a thousand files, in a thread."""

@@ -262,3 +262,4 @@ def test_a_preparation_that_fails_halts_and_ends_the_run_with_its_reason(monkeyp
     run.drive(6.0)
     assert run.last_speed == 0.0
     assert (run.summary["mode"], run.summary["stop_reasons"]) == ("FAULT", ["no room"])
+    assert [entry["event"] for entry in run.log.entries if entry["log_level"] == "error"] == ["mode"], "no traceback"

@@ -138,6 +138,7 @@ class Compiler:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, folder: Path, parts: Sequence[str]) -> None:
         self.errors = b""
+        self.returncode = 0
         self.words: Sequence[str] = ()
         self.killed: list[Compiler] = []
         self._parts = parts
@@ -245,6 +246,16 @@ async def test_a_preparation_without_a_result_says_why(monkeypatch: pytest.Monke
     compiler = Compiler(monkeypatch, tmp_path, ())
     compiler.errors = b"Traceback\nOSError: [Errno 28] No space left on device\n"
     with pytest.raises(UserError, match=r"\(OSError: \[Errno 28\] No space .*memory or disk space; make room"):
+        await KernelPreparation((EMULATOR, BAYES))(ROUND)
+
+
+async def test_a_compiler_that_the_system_ended_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """As for lack of memory."""
+    compiler = Compiler(monkeypatch, tmp_path, ())
+    compiler.returncode = -9
+    with pytest.raises(
+        UserError, match=r"\(the process that compiled them was ended by SIGKILL\), likely for lack of"
+    ):
         await KernelPreparation((EMULATOR, BAYES))(ROUND)
 
 
