@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +63,15 @@ TURNS: Final = np.arange(0.0, 2.0 * math.pi, math.radians(5.0))
 """Turns from the obstacle's direction that are tried, in this order."""
 
 
+class Place(NamedTuple):
+    """Where a robot is to stand, in odometry's frame."""
+
+    x: float
+    y: float
+    room_m: float
+    """Least distance from it to what stands beside it, m."""
+
+
 def leave_canyon(
     percept: Percept,
     goal: tuple[float, float],
@@ -100,10 +109,11 @@ def leave_canyon(
     # With an evidence grid the look-ahead goes round what was heard; in a building a wall answers ahead on most ways.
     reach_m = config.look_ahead_m if percept.occupancy is None else 0.0
     detour = _presume(echoes, pose, detour, to_goal, bearing, room, reach_m, room + 0.5 * config.look_m)
-    virtual = _virtual(percept, goal, detour, config)
-    held = [canyon for canyon in percept.canyons if holds(canyon, pose, goal, config)]
-    leaving = _leaving(held, detour.leaving, pose, room)
+    stand = Place(*goal, body_radius_m + PASSAGE_M)
+    virtual = _virtual(percept, stand, detour, config)
     near = remember(detour.near, echoes, pose, detour.driven_m, body_radius_m)
+    held = _held(percept, np.concatenate([echoes, places(near)]), stand, config)
+    leaving = _leaving(held, detour.leaving, pose, room)
     detour = replace(detour.nearer(to_goal), near=near, leaving=leaving)
     is_held = leaving is not None or len(held) > 0
     waits = waits and detour.side == 0 and not detour.is_held
@@ -115,7 +125,7 @@ def leave_canyon(
     if detour.side == 0:
         if free >= min(to_goal, config.look_m) and not is_held:
             return None, detour
-        detour = _begin(points, pose, goal, percept.canyons, detour, room, config)
+        detour = _begin(points, pose, stand, percept.canyons, detour, room, config)
     elif not is_held and detour.ends_at(to_goal, free):
         return None, detour.ended()
     else:
@@ -131,7 +141,7 @@ def leave_canyon(
     return Response(SCHEMA, gain * math.cos(heading), gain * math.sin(heading)), detour
 
 
-def _virtual(percept: Percept, goal: tuple[float, float], detour: Detour, config: LeaveCanyonConfig) -> list[Floats]:
+def _virtual(percept: Percept, goal: Place, detour: Detour, config: LeaveCanyonConfig) -> list[Floats]:
     """Return points on walls that are only thought of, each (n, 2): mouths that are closed, and what is presumed."""
     closed = [canyon for canyon in percept.canyons if is_closed(canyon, percept.pose, goal, config)]
     walls = [between(*canyon.mouth) for canyon in closed]
@@ -148,17 +158,17 @@ def _free_m(points: Floats, pose: Pose, heading_rad: float, room_m: float) -> fl
     return float(free_paths_m(points, pose, np.array([heading_rad]), room_m)[0])
 
 
-def is_closed(canyon: Canyon, pose: Pose, goal: tuple[float, float], config: LeaveCanyonConfig) -> bool:
+def is_closed(canyon: Canyon, pose: Pose, goal: Place, config: LeaveCanyonConfig) -> bool:
     """Return whether a canyon's mouth is a wall for this robot: neither it nor the goal is inside."""
     if canyon.probability < config.probability_min:
         return False
-    return not (_is_inside(canyon, pose.x, pose.y) or _is_inside(canyon, *goal))
+    return not (_is_inside(canyon, pose.x, pose.y) or _has_goal(canyon, goal))
 
 
-def holds(canyon: Canyon, pose: Pose, goal: tuple[float, float], config: LeaveCanyonConfig) -> bool:
+def holds(canyon: Canyon, pose: Pose, goal: Place, config: LeaveCanyonConfig) -> bool:
     """Return whether the robot is inside a canyon that it must leave for its goal."""
     is_sure = canyon.probability >= config.probability_min
-    return is_sure and _is_inside(canyon, pose.x, pose.y) and not _is_inside(canyon, *goal)
+    return is_sure and _is_inside(canyon, pose.x, pose.y) and not _has_goal(canyon, goal)
 
 
 def _half_width_m(canyon: Canyon) -> float:
@@ -166,12 +176,42 @@ def _half_width_m(canyon: Canyon) -> float:
     return 0.5 * abs(math.cos(canyon.axis_rad) * (y2 - y1) - math.sin(canyon.axis_rad) * (x2 - x1))
 
 
-def _is_inside(canyon: Canyon, x: float, y: float, before_m: float = 0.0) -> bool:
-    """Return whether a place is inside a canyon, or before its mouth by no more than `before_m`."""
+def _is_inside(
+    canyon: Canyon, x: float, y: float, before_m: float = 0.0, behind_m: float = 0.0, beside_m: float = 0.0
+) -> bool:
+    """Return whether a place is inside a canyon, or as little before its mouth, behind its back, or beside it, m."""
     x1, y1, x2, y2 = canyon.mouth
     c, s = math.cos(canyon.axis_rad), math.sin(canyon.axis_rad)
     dx, dy = x - 0.5 * (x1 + x2), y - 0.5 * (y1 + y2)
-    return -before_m < c * dx + s * dy < canyon.depth_m and abs(c * dy - s * dx) < _half_width_m(canyon)
+    depth_m, half_m = canyon.depth_m + behind_m, _half_width_m(canyon) + beside_m
+    return -before_m < c * dx + s * dy < depth_m and abs(c * dy - s * dx) < half_m
+
+
+def _held(percept: Percept, heard: Floats, goal: Place, config: LeaveCanyonConfig) -> list[Canyon]:
+    """Return the canyons that the robot must leave for its goal; `heard` (n, 2) is what stands near it, m."""
+    pose = percept.pose
+    held = [canyon for canyon in percept.canyons if holds(canyon, pose, goal, config)]
+    if not held:
+        return held
+    bearing, to_goal = math.atan2(goal.y - pose.y, goal.x - pose.x), math.dist(goal[:2], (pose.x, pose.y))
+    is_free = _free_m(heard, pose, bearing, goal.room_m) >= to_goal
+    return [canyon for canyon in held if not (is_free and _is_beside(canyon, goal))]
+
+
+def _has_goal(canyon: Canyon, goal: Place) -> bool:
+    """Return whether a goal is inside a canyon, whose walls are known as a rectangle: they bend and slant.
+
+    What is so near beyond a side that the body could not stand there is inside.
+    """
+    return _is_inside(canyon, goal.x, goal.y, behind_m=goal.room_m, beside_m=goal.room_m)
+
+
+def _is_beside(canyon: Canyon, goal: Place) -> bool:
+    """Return whether a goal lies beside a canyon, and neither behind its back nor before its mouth.
+
+    Behind its mouth a canyon may be wider than there: such a goal is outside only if something is heard between.
+    """
+    return _is_inside(canyon, goal.x, goal.y, beside_m=math.inf)
 
 
 def _leaving(held: list[Canyon], before: Canyon | None, pose: Pose, room_m: float) -> Canyon | None:
@@ -233,20 +273,20 @@ def _open_sides(points: Floats, pose: Pose, way_rad: float, room_m: float) -> li
 def _begin(
     points: Floats,
     pose: Pose,
-    goal: tuple[float, float],
+    goal: Place,
     canyons: tuple[Canyon, ...],
     detour: Detour,
     room_m: float,
     config: LeaveCanyonConfig,
 ) -> Detour:
     """Return a detour that begins here, on the side that promises the shorter way."""
-    to_goal, bearing = math.hypot(goal[0] - pose.x, goal[1] - pose.y), math.atan2(goal[1] - pose.y, goal[0] - pose.x)
+    to_goal, bearing = math.hypot(goal.x - pose.x, goal.y - pose.y), math.atan2(goal.y - pose.y, goal.x - pose.x)
 
     def cost(side: Side) -> float:
         for canyon in canyons:
-            if canyon.probability >= config.probability_min and not _is_inside(canyon, *goal):
+            if canyon.probability >= config.probability_min and not _has_goal(canyon, goal):
                 end = _end(canyon, side)
-                return math.dist((pose.x, pose.y), end) + math.dist(end, goal)
+                return math.dist((pose.x, pose.y), end) + math.dist(end, goal[:2])
         _, heading = _along(points, pose, side, bearing, room_m, config)
         return abs(wrap_angle(heading - bearing))
 

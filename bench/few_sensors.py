@@ -101,10 +101,19 @@ def make_world(seed: int, reflection: Reflection) -> WorldConfig:
 
 
 def next_goal(rng: np.random.Generator, space: FreeSpace, here: Place, room_m: Place) -> tuple[Place, float] | None:
-    """Return a place `AWAY_M` away and the length of the shortest way to it, m; None where there is none."""
+    """Return a place `AWAY_M` away and the length of the shortest way to it, m; None where there is none.
+
+    From the middle of a small room, where a robot has given up a goal, it is the farthest of many places.
+    """
+    nearer: list[Place] = []
     for _ in range(300):
         there = (float(rng.uniform(-room_m[0], room_m[0])), float(rng.uniform(-room_m[1], room_m[1])))
-        if math.dist(here, there) >= AWAY_M and (way := shortest_way(space, here, there)) is not None:
+        if math.dist(here, there) < AWAY_M:
+            nearer.append(there)
+        elif (way := shortest_way(space, here, there)) is not None:
+            return there, length_m(way)
+    for there in sorted(nearer, key=lambda place: math.dist(here, place), reverse=True):
+        if (way := shortest_way(space, here, there)) is not None:
             return there, length_m(way)
     return None
 

@@ -19,7 +19,8 @@ Side: TypeAlias = Literal[-1, 1]
 LEAVE_FREE_M: Final = 1.2
 """The detour ends where the goal's direction is free for this far, …"""
 PROGRESS_M: Final = 0.4
-"""… and the goal is nearer by this than it has been before: so no detour ends where an earlier one began."""
+"""… and the goal is nearer by this than it has been before: so no detour ends where an earlier one began; by half of
+what was left where that is less: one that began beside the goal would pass it."""
 TURNED_BACK_RAD: Final = math.radians(150.0)
 """What was only presumed is given up if going round it leads back more than this, …"""
 FARTHER_M: Final = 1.5
@@ -89,7 +90,7 @@ class Detour:
     def ends_at(self, to_goal_m: float, free_m: float) -> bool:
         """Return whether it ends where the goal's direction is free for so far: past all that is only presumed."""
         needed_m = to_goal_m if self.block is not None else min(to_goal_m, LEAVE_FREE_M)
-        return to_goal_m < self.began_m - PROGRESS_M and free_m >= needed_m
+        return to_goal_m < max(self.began_m - PROGRESS_M, 0.5 * self.began_m) and free_m >= needed_m
 
     def ended(self) -> Detour:
         """Return what is kept after it."""

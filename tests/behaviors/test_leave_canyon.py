@@ -12,7 +12,7 @@ import pytest
 from behaviors.arbiter import Drive, arbitrate
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
-from behaviors.leave_canyon import SCHEMA, is_closed, leave_canyon
+from behaviors.leave_canyon import SCHEMA, Place, is_closed, leave_canyon
 from behaviors.memory.detour import NO_DETOUR, Detour
 from behaviors.move_to_goal import Goal, move_to_goal
 from behaviors.surroundings.blocked_ahead import Block
@@ -83,9 +83,9 @@ def test_what_is_ahead_is_gone_round_with_a_side_that_is_kept() -> None:
 def test_the_mouth_is_a_wall_unless_the_robot_or_the_goal_is_inside(
     x: float, goal: tuple[float, float], closed: bool
 ) -> None:
-    assert is_closed(CANYON, Pose(x, 0.0, 0.0), goal, CONFIG) is closed
+    assert is_closed(CANYON, Pose(x, 0.0, 0.0), Place(*goal, 0.45), CONFIG) is closed
     doubtful = replace(CANYON, probability=0.5)
-    assert not is_closed(doubtful, Pose(x, 0.0, 0.0), goal, CONFIG)
+    assert not is_closed(doubtful, Pose(x, 0.0, 0.0), Place(*goal, 0.45), CONFIG)
 
 
 @pytest.mark.parametrize(("y", "goal_y"), [(0.6, 0.4), (-0.6, -0.4)])
@@ -145,6 +145,23 @@ def test_inside_a_known_canyon_a_detour_begins_and_does_not_end() -> None:
     going, _ = leave_canyon(seen(3.0, 0.0, canyons=(CANYON,)), (6.0, 0.0), detour, 0.381, BLIND)
     assert going is not None
     assert leave_canyon(seen(2.0, 0.0, canyons=(CANYON,)), (3.5, 0.0), NO_DETOUR, 0.381, BLIND)[0] is None
+
+
+@pytest.mark.parametrize(
+    ("goal", "side_m", "leaves"),
+    [((2.6, 1.3), 1.6, False), ((4.3, 0.0), 4.0, False), ((5.0, 0.0), 9.0, True), ((2.6, 2.6), 9.0, False),
+     ((2.6, 2.6), 1.6, True)],
+)  # fmt: skip
+def test_a_goal_beside_a_canyon_is_outside_only_if_something_is_between(
+    goal: tuple[float, float], side_m: float, *, leaves: bool
+) -> None:
+    """A room is no rectangle as wide as what was taken for its mouth: goals in its corners were left, in loops.
+
+    Where the body could not stand, its wall is not, and where nothing is heard between, it is wider.
+    """
+    side = np.column_stack([np.linspace(1.0, 4.0, 31), np.full(31, side_m)])
+    response, _ = leave_canyon(seen(2.0, 0.7, side, canyons=(CANYON,)), goal, NO_DETOUR, 0.381, BLIND)
+    assert (response is not None) is leaves
 
 
 NARROW = Canyon(4, (1.0, 0.5, 1.0, -0.5), 0.0, 6.0, 0.97)

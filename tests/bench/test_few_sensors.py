@@ -35,6 +35,14 @@ def test_goals_lie_far_away_and_are_free() -> None:
     assert clearance(*there, scene.circles, scene.segments) > room_m - 0.15
 
 
+def test_where_no_place_is_so_far_away_the_farthest_is_the_goal() -> None:
+    """A robot that gave up in the middle of a room got no further goal, and eight minutes were not driven."""
+    settings, world = settings_of("round-12"), make_world(5001, "cone")
+    asked = next_goal(np.random.default_rng(0), free_space(world, closed_room_m(settings)), (1.33, -0.35), (3.2, 4.4))
+    assert asked is not None
+    assert 4.5 < math.dist(asked[0], (1.33, -0.35)) < AWAY_M
+
+
 @pytest.mark.compiled
 def test_a_drive_is_counted() -> None:
     """In a room in which a robot that waited for a quiet second before each start gave its second goal up."""

@@ -31,6 +31,13 @@ def test_it_ends_nearer_to_the_goal_and_past_what_is_only_presumed() -> None:
     assert presumed.ended().block is None
 
 
+def test_one_that_began_beside_the_goal_ends_before_it_has_passed_it() -> None:
+    beside = replace(BEGAN, began_m=0.62, nearest_m=0.62)
+    assert beside.ends_at(0.3, 0.3)
+    assert not beside.ends_at(0.35, 0.4)
+    assert not beside.ends_at(0.3, 0.2), "something is between"
+
+
 def test_after_a_round_it_tries_the_other_side() -> None:
     here = Pose(0.1, 0.0, 0.0)
     assert BEGAN.on_a_side_that_leads_on(here, GOAL, has_grid=False).side == -1
