@@ -84,8 +84,8 @@ BUILT: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
     "silence as maximum": {"kind": "reported_silence", "range_m": math.inf},
 })  # fmt: skip
 """Faults that a robot is built with: they are there from the start."""
-CLOCK: Final = "clock"
-"""Kinds with this word change nothing on a robot whose packets carry no stamps."""
+CLOCK, EXCHANGED = "clock", "exchanged"
+"""Kinds with these words change nothing on a robot whose packets carry no stamps, and on one with one sensor."""
 AHEAD_DEG: Final = 60.0
 MOVED_M: Final = 0.5
 """A robot that has driven less since a lie began has hardly changed what it hears."""
@@ -246,7 +246,8 @@ def make_lie(kind: str, settings: Settings, begin_s: float) -> Fault:
     if values.get("sensors") == AHEAD:
         values["sensors"] = [i for i, angle_deg in enumerate(axes) if angle_deg <= AHEAD_DEG]
     elif values.get("sensors") == ONE:
-        values["sensors"] = [int(np.argmin(axes))]
+        of = settings.ring.sensor_of  # one on a servo has a number for each of its bearings
+        values["sensors"] = [i for i, sensor in enumerate(of) if sensor == of[int(np.argmin(axes))]]
     elif values.get("sensors") == ALL_BUT_ONE:
         values["sensors"] = [i for i in range(len(axes)) if i != int(np.argmin(axes))]
     adapter: TypeAdapter[Fault] = TypeAdapter(Fault)
@@ -340,12 +341,13 @@ def run_trial(
 def trials(
     robots: Sequence[str], rooms: Sequence[str], kinds: Sequence[str], seeds: Iterable[int], moments: int
 ) -> Iterator[Plan]:
-    """Yield the arguments of each trial, without errors of clocks that a robot does not have."""
+    """Yield the arguments of each trial, without errors of clocks, or of two sensors, that a robot does not have."""
     for robot in robots:
-        stamped = _settings("room", robot).robot.driver != "arcos"
+        settings = _settings("room", robot)
+        stamped, has_two = settings.robot.driver != "arcos", settings.ring.sensor_count > 1
         for room, seed, moment in product(rooms, seeds, range(moments)):
             for kind in kinds:
-                if stamped or CLOCK not in kind:
+                if (stamped or CLOCK not in kind) and (has_two or EXCHANGED not in kind):
                     yield robot, room, kind, seed, moment
 
 

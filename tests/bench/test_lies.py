@@ -8,7 +8,19 @@ from itertools import product
 import numpy as np
 import pytest
 
-from bench.lies import KINDS, ROBOTS, Plan, TrialResult, honest, lies_table, make_lie, measure, run_trial, trials
+from bench.lies import (
+    BUILT,
+    KINDS,
+    ROBOTS,
+    Plan,
+    TrialResult,
+    honest,
+    lies_table,
+    make_lie,
+    measure,
+    run_trial,
+    trials,
+)
 from config.load import list_shipped, load_robot, load_settings
 from perception.ring_faults.monitor import REASONS as RING_REASONS
 from runtime.cycle.modes import CLOCK_REASONS
@@ -116,6 +128,14 @@ def test_trials_and_their_table() -> None:
     table = lies_table([result])
     assert [column.header for column in table.columns] == ["lie", "p3dx"]
     assert list(table.columns[1].cells) == ["1 1/1"]
+
+
+def test_a_fault_of_the_sensor_on_a_servo_is_one_at_all_its_bearings() -> None:
+    settings = load_settings("room", robot="servo1")
+    assert make_lie("one deaf", settings, 0.0).model_dump()["sensors"] == tuple(range(60))
+    assert make_lie("one deaf", load_settings("room", robot="hobby3"), 0.0).model_dump()["sensors"] == (1,)
+    kinds = [kind for _, _, kind, _, _ in trials(("servo1",), ("room",), tuple(BUILT), range(1), 1)]
+    assert [kind for kind in BUILT if kind not in kinds] == ["two exchanged"]
 
 
 @pytest.mark.parametrize("kind", KINDS)

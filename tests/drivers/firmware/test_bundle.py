@@ -141,6 +141,17 @@ def test_the_robots_of_the_page_are_the_shipped_ones(name: str) -> None:
     assert built.ring == shipped.ring
 
 
+@pytest.mark.parametrize("board", BOARDS)
+def test_the_wiring_of_three_sensors_is_that_of_either_board(board: Board) -> None:
+    rows = re.findall(r"\| (\d) \| [\w° ]+ \| GP(\d+), (\d+) \| GP(\d+), (\d+) \|", PAGE)
+    at = BOARDS.index(board)
+    sensors = tuple(("hc-sr04", int(row[1 + at]), int(row[3 + at])) for row in rows)
+    assert [int(row[0]) for row in rows] == [0, 1, 2]
+    changes = read_config(OF_THE_PAGE["hobby3"], "the page")
+    check_pins(values(board, **changes | {"SENSORS": sensors}), board, CONFIG_NAME)
+    assert board == "esp32" or sensors == changes["SENSORS"]
+
+
 def test_the_commands_of_the_page_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """From parts to driving: write the firmware, put the page's lines in, write it again, check, run (emulated)."""
     monkeypatch.chdir(tmp_path)
