@@ -99,7 +99,8 @@ def assert_no_worse(drive: CalibrationDrive, found: Calibration) -> None:
 @pytest.mark.parametrize(
     ("kind", "has_way"),
     [
-        *((kind, False) for kind in LEGS if kind != "furnished"), ("straight", True),
+        *((kind, False) for kind in LEGS if kind != "furnished"),
+        pytest.param("straight", True, marks=pytest.mark.soak),
         pytest.param("furnished", False, marks=pytest.mark.soak),
     ],
 )  # fmt: skip
