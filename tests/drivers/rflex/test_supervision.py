@@ -98,7 +98,7 @@ def test_a_base_that_does_not_follow_is_stalled() -> None:
     assert not stalled(stall), "too slow to judge by"
 
 
-@pytest.mark.parametrize("seed", [*range(10), *(pytest.param(k, marks=pytest.mark.soak) for k in range(10, 40))])
+@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(k, marks=pytest.mark.soak) for k in range(4, 40))])
 def test_a_base_that_obeys_within_its_limits_is_never_stalled_and_one_that_fails_is(seed: int) -> None:
     """Commands of all lengths, that grow, leap, stop and reverse; then the wheels do not turn."""
     rng = np.random.default_rng(seed)

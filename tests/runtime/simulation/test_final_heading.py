@@ -69,7 +69,7 @@ def test_a_goal_is_left_with_its_final_heading(robot: str) -> None:
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("robot", ["denning", "p3dx"])
+@pytest.mark.parametrize("robot", ["denning", pytest.param("p3dx", marks=pytest.mark.soak)])
 def test_each_waypoint_of_a_route_is_left_with_its_final_heading(robot: str) -> None:
     found = stands(settings_of(robot, mission=route(PLACES, "odom").plan), 16.0)
     assert len(found) == len(PLACES)

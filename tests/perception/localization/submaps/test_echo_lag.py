@@ -38,7 +38,7 @@ def lagging(lag_s: float, seed: int = 1, rounds: int = 2) -> list[Firing]:
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("lag_s", [-0.3, 0.1])
+@pytest.mark.parametrize("lag_s", [pytest.param(-0.3, marks=pytest.mark.soak), 0.1])
 def test_the_lag_is_found(lag_s: float) -> None:
     found = lag_of(lagging(lag_s), RING)
     assert found.lag_s == pytest.approx(lag_s, abs=0.03)
