@@ -41,13 +41,14 @@ from perception.method import Method
 from perception.no_method import NOT_READY, NoMethod
 from perception.obstacle_echoes.fresh_echoes import FreshEchoes
 from perception.obstacle_echoes.unheard_echoes import UnheardEchoes
+from perception.obstacle_echoes.unheard_feet import with_unheard_feet
 from perception.percept import Canyon, FieldOfView, OccupancyWindow
 from perception.polyline import Polyline
 from perception.recognition import NO_RECOGNITION, begin_recognition, find_in_room, place_robot, with_window
 from perception.ring_faults.monitor import RingMonitor
 from perception.sensor_faults.monitor import SensorMonitor
 from perception.sensor_faults.report import SensorReport
-from perception.sensor_mounts import mounts_array, reach_m
+from perception.sensor_mounts import farthest_m, mounts_array, reach_m
 from perception.snapshot import Snapshot, put_back, snapshot_of
 from perception.vacant_areas import VacantArea, VacantAreas
 
@@ -101,8 +102,7 @@ class Perception:
         self._reach_m, self._sensors = reach_m(ring), len(ring.mounts)
         self.vacant = VacantAreas()
         """In the frame of `method`."""
-        radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
-        self.canyon_map = CanyonMap(2.0 * (radius_m + PASSAGE_M) - ENDS_M)
+        self.canyon_map = CanyonMap(2.0 * (farthest_m(ring.mounts) + PASSAGE_M) - ENDS_M)
         """The box canyons found so far, in odometry's frame."""
         if recognises:
             self.recognise(models, config)
@@ -296,7 +296,7 @@ class Perception:
     def surroundings(
         self, robot_s: float, ring_yaw: float, pose: Pose, age_max_s: float
     ) -> tuple[FieldOfView, Floats]:
-        """Return where the ring has looked, and the obstacles: as `obstacles`, and walls beside its blind sides.
+        """Return where the ring has looked, and the obstacles: echoes, what is recognised, walls beside blind sides.
 
         Parameters
         ----------
@@ -313,6 +313,7 @@ class Perception:
         axes = ring_yaw + self._axes
         if self._turning:
             axes[self._turning] += pose.theta - ring_yaw
+        points = with_unheard_feet(points, self.near_objects(), self._models, pose, farthest_m(self._ring.mounts))
         points, *sides = self._echoes.with_blind_sides(points, pose, axes)
         view = FieldOfView(bearings, ages, axes, sensor_ages, self._half_angle, self._reach_m, age_max_s, *sides)
         return view, points

@@ -33,6 +33,11 @@ def mounts_array(mounts: Sequence[tuple[float, float, float]]) -> Floats:
     return np.array(mounts, dtype=np.float64).reshape(len(mounts), 3)
 
 
+def farthest_m(mounts: Sequence[tuple[float, float, float]]) -> float:
+    """Return how far the farthest sensor is from the ring's centre, m."""
+    return max(math.hypot(x, y) for x, y, _ in mounts)
+
+
 def turned_mounts(mounts: Floats, turning: tuple[int, ...], turn: float) -> Floats:
     """Return the mounts with those of some sensors turned about the ring's centre; the same array if there are none.
 
