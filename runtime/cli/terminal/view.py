@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 EVERY_CYCLES: Final = 5
 """Draw every fifth cycle: 4 Hz at 20 Hz."""
+QUANTILES_EVERY_CYCLES: Final = 20
+"""Cycles from one computation of their quantiles to the next: after an hour each takes 2 ms of the interpreter."""
 TRAIL: Final = 400
 PICTURE: Final = "runtime.cli.terminal"
 """The module that draws, run as a program."""
@@ -83,6 +85,9 @@ class View:
         """The mode that was drawn last; a new one is drawn at once."""
         self._slot: Snapshot | None = None
         self._stats: CycleStats | None = None
+        self._quantiles: tuple[Quantiles, Quantiles] | None = None
+        """Of all cycles up to `_counted`: how long they took, and how late they began."""
+        self._counted = 0
         self._wake = threading.Event()
         self._done = False
         self._thread = Worker("view", self._pass_on)
@@ -162,9 +167,12 @@ class View:
                 pass
 
     def _completed(self, snapshot: Snapshot) -> Snapshot:
-        """Add what would take a cycle too long: the quantiles of all cycles, from half a millisecond to several."""
-        if self._stats is not None:
-            snapshot = replace(snapshot, cycle_us=self._stats.cycle_us(), lag_us=self._stats.lag_us())
+        """Add what would take a cycle too long: the quantiles of all cycles, anew after `QUANTILES_EVERY_CYCLES`."""
+        stats = self._stats
+        if stats is not None:
+            if self._quantiles is None or stats.cycles >= self._counted + QUANTILES_EVERY_CYCLES:
+                self._counted, self._quantiles = stats.cycles, (stats.cycle_us(), stats.lag_us())
+            snapshot = replace(snapshot, cycle_us=self._quantiles[0], lag_us=self._quantiles[1])
         return replace(snapshot, is_paused=self.is_paused())
 
     def _pass_on(self) -> None:

@@ -24,10 +24,10 @@ from drivers.registry import make_driver
 from perception.detected_object import MapCounts
 from runtime.cli.terminal import view
 from runtime.cli.terminal.picture import Snapshot
-from runtime.cli.terminal.view import EVERY_CYCLES, View, after_each_cycle
+from runtime.cli.terminal.view import EVERY_CYCLES, QUANTILES_EVERY_CYCLES, View, after_each_cycle
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.closed_loop import simulate
-from runtime.timing.cycle_stats import CycleStats
+from runtime.timing.cycle_stats import CycleStats, Quantiles
 from tests.hil.machine import TIMEOUT_S
 
 SETTINGS = load_settings("hallway")
@@ -187,6 +187,25 @@ def test_the_reason_why_the_robot_holds_is_shown() -> None:
         shown.on_cycle(record, run.state, CycleStats(0.005), make_driver(SETTINGS))
     assert shown._slot is not None
     assert shown._slot.reason == "the goal is reached"
+
+
+def test_quantiles_are_computed_once_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After an hour they take milliseconds of the interpreter, for which a cycle might wait."""
+    stats, computed = CycleStats(0.005), list[int]()
+    shown = View(SETTINGS, Console(file=io.StringIO()), "m")
+    shown._stats = stats
+    quantiles = stats.cycle_us
+
+    def counted() -> Quantiles:
+        computed.append(stats.cycles)
+        return quantiles()
+
+    monkeypatch.setattr(stats, "cycle_us", counted)
+    for _ in range(2 * QUANTILES_EVERY_CYCLES + 1):
+        stats.add_cycle(0.001 * (stats.cycles + 1))
+        shown_us = shown._completed(EMPTY).cycle_us
+    assert computed == [1, QUANTILES_EVERY_CYCLES + 1, 2 * QUANTILES_EVERY_CYCLES + 1]
+    assert shown_us["max"] == pytest.approx(1e3 * stats.cycles)
 
 
 async def test_a_snapshot_is_taken_when_the_cycle_has_ended() -> None:
