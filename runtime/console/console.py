@@ -22,6 +22,7 @@ from runtime.console.commands.command import CommandContext
 from runtime.console.commands.dispatcher import CommandDispatcher
 from runtime.console.commands.parameters import parameters
 from runtime.console.commands.place_commands import places_message
+from runtime.console.commands.registry import reader
 from runtime.console.commands.tuning import Tuning
 from runtime.console.frames.frame_publisher import FramePublisher
 from runtime.console.frames.session_info import session_info
@@ -189,6 +190,8 @@ class Console:
                 "the console accepts other machines: anyone with the token can drive, and nothing is encrypted"
             )
         self._publisher.open()
+        # Made while the robot is being connected, or the first command would wait for it.
+        asyncio.get_running_loop().run_in_executor(None, reader)
         self._challenge()
         self._run.health.watch("console", self.probe)
         try:

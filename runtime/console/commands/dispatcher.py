@@ -13,7 +13,7 @@ from runtime.console.clients.client import Client
 from runtime.console.commands.command import ANSWERED_LATER, Call, Command, CommandContext, Permission
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.messages import MalformedMessage, Message
-from runtime.console.commands.registry import COMMANDS, READER
+from runtime.console.commands.registry import COMMANDS, reader
 from runtime.console.http.client_limits import ConsoleLog
 from runtime.console.sent_messages import AnswerMessage
 
@@ -45,7 +45,7 @@ class CommandDispatcher:
     def receive(self, client: Client, text: str | bytes) -> None:
         """Carry out a message, or answer why not; never raises for what a client can cause."""
         try:
-            message = READER.read(text)
+            message = reader().read(text)
         except MalformedMessage as error:
             self._refuse(client, error.id, CommandError(str(error), error.field))
             return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -108,4 +109,9 @@ _ALL: Final[tuple[Command[Any], ...]] = (
 )
 
 COMMANDS: Final = MappingProxyType({command.name: command for command in _ALL})
-READER: Final = MessageReader({command.name: command.type for command in _ALL})
+
+
+@functools.cache
+def reader() -> MessageReader:
+    """Return what reads the messages of all commands; making it takes 30 ms, so a start does not wait for it."""
+    return MessageReader({command.name: command.type for command in _ALL})

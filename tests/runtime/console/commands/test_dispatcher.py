@@ -10,7 +10,7 @@ import pytest
 
 from runtime.console.clients.challenges import STOPPED
 from runtime.console.commands.command import Permission
-from runtime.console.commands.registry import COMMANDS, READER
+from runtime.console.commands.registry import COMMANDS, reader
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode, ModeState
 from tests.runtime.console.console_case import open_console
@@ -156,7 +156,7 @@ def test_whatever_requests_a_motion_needs_a_challenge() -> None:
     needs = {
         message["type"]
         for message in ALL
-        if COMMANDS[message["type"]].can_begin_motion(READER.read(_text(message)).arguments)
+        if COMMANDS[message["type"]].can_begin_motion(reader().read(_text(message)).arguments)
     }
     assert {message["type"] for message, _ in ROBOT_REQUESTS} - needs == {"halt", "disarm"}
     assert {message["type"] for message, _ in EDITS} <= needs

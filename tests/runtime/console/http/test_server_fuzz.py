@@ -18,7 +18,7 @@ import structlog
 from behaviors.teleoperation import Teleoperate
 from drivers.driver import RobotDriver
 from runtime.console.commands.messages import MalformedMessage
-from runtime.console.commands.registry import READER
+from runtime.console.commands.registry import reader
 from runtime.console.console import Console
 from runtime.console.http.client_limits import Limits
 from runtime.cycle.inputs import Request
@@ -103,7 +103,7 @@ class NullTransport:
 
 def is_well_formed(text: str) -> bool:
     try:
-        READER.read(text)
+        reader().read(text)
     except MalformedMessage:
         return False
     return True
