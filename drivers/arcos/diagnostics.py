@@ -74,8 +74,9 @@ _UNANSWERED: Final = MappingProxyType(
             "it loses packets or is no Pioneer: check the line, then restart it, or its simulator",
         ),
         Stage.DONE: (
-            "the robot answers the SYNCs and opens its session, but sends no odometry",
-            "its controller has stopped working: restart it, or its simulator",
+            "the robot answers the SYNCs and opens its session, but sends no odometry within a second",
+            "its controller has stopped working, or is set to send it more rarely: restart it, or its simulator, and "
+            "set its SIPs to one each 100 ms",
         ),
     }
 )
