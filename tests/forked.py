@@ -10,21 +10,27 @@ child begins: while those wait, the rest computes.
 
 from __future__ import annotations
 
+import fcntl
 import os
+import shutil
 import signal
 import struct
 import sys
+import tempfile
 import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import groupby
 from multiprocessing.connection import Connection, Pipe, wait
+from pathlib import Path
 from typing import Any, Final
 
 import pytest
 
 NUMBER: Final = struct.Struct("=I")
 DONE: Final = "done"
+PROCESS: Final = "process"
+"""Of the names of the processes' temporary folders."""
 
 
 def files_of(items: Sequence[pytest.Item]) -> list[list[int]]:
@@ -45,6 +51,31 @@ def taken(*pipes: int) -> Iterator[int]:
     for pipe in pipes:
         while data := os.read(pipe, NUMBER.size):
             yield NUMBER.unpack(data)[0]
+
+
+def made_once(folders: pytest.TempPathFactory, name: str, make: Callable[[Path], None]) -> Path:
+    """Return this process's own copy of a file, `name`/hall.mcap, which one process of a run makes for all.
+
+    Parameters
+    ----------
+    folders : TempPathFactory
+        Of this process.
+    name : str
+        Of the folder: unique among these files.
+    make : callable
+        Writes the file at a path.
+    """
+    own = folders.getbasetemp()
+    shared = (own.parent if own.name.startswith(PROCESS) else own) / "made_once" / name
+    shared.mkdir(parents=True, exist_ok=True)
+    file = shared / "hall.mcap"
+    with (shared / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not file.exists():
+            draft = Path(tempfile.mkdtemp(dir=shared)) / file.name
+            make(draft)
+            draft.rename(file)
+    return Path(shutil.copy2(file, folders.mktemp(name) / file.name))
 
 
 class ForkedTests:
@@ -190,7 +221,7 @@ class _Child:
         capture.start_global_capturing()
         capture.suspend_global_capture(in_=False)
         factory = _temp_paths(session)
-        own = factory.getbasetemp() / f"process{number}"
+        own = factory.getbasetemp() / f"{PROCESS}{number}"
         own.mkdir()
         factory._basetemp = own
 

@@ -8,8 +8,9 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from typing import Any
 
-from tests.forked import shared_numbers, taken
+from tests.forked import made_once, shared_numbers, taken
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFTEST = """
@@ -106,3 +107,31 @@ def test_each_number_is_taken_once() -> None:
     for pipe in pipes:
         os.close(pipe)
     assert sorted(number for mine in lists for number in mine) == list(range(5000))
+
+
+class Folders:
+    """Temporary folders of a process."""
+
+    def __init__(self, own: Path) -> None:
+        self.own = own
+
+    def getbasetemp(self) -> Path:
+        return self.own
+
+    def mktemp(self, name: str) -> Path:
+        (self.own / name).mkdir(parents=True)
+        return self.own / name
+
+
+def test_a_file_is_made_once_and_each_process_has_its_own_copy(tmp_path: Path) -> None:
+    made: list[Path] = []
+
+    def make(path: Path) -> None:
+        made.append(path)
+        path.write_text("a recording")
+
+    processes: list[Any] = [Folders(tmp_path / f"process{number}") for number in range(3)]
+    copies = [made_once(folders, "run", make) for folders in processes]
+    assert copies == [tmp_path / f"process{number}" / "run" / "hall.mcap" for number in range(3)]
+    assert [path.read_text() for path in copies] == 3 * ["a recording"]
+    assert len(made) == 1

@@ -1,4 +1,4 @@
-"""Runs in the six-drum hallway, recorded once per worker process: to replay and to analyse, also as a ring log."""
+"""Runs in the six-drum hallway, recorded once in a run of all tests: to replay and to analyse, also as a ring log."""
 
 from __future__ import annotations
 
@@ -8,23 +8,26 @@ import pytest
 
 from config.errors import DONE
 from runtime.cli.app import run_command
+from tests.forked import made_once
 from tests.recorded import SECONDS, hall, record
 
 
 @pytest.fixture(scope="session")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("recorded") / "hall.mcap"
-    status = record(hall(), path, SECONDS)
-    assert (status.dropped, status.last_error, status.files) == (0, None, 1)
-    assert status.bytes == path.stat().st_size
-    return path
+    def make(path: Path) -> None:
+        status = record(hall(), path, SECONDS)
+        assert (status.dropped, status.last_error, status.files) == (0, None, 1)
+        assert status.bytes == path.stat().st_size
+
+    return made_once(tmp_path_factory, "recorded", make)
 
 
 @pytest.fixture(scope="session")
 def hall_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("shown") / "hall.mcap"
-    assert record(hall(), path, 14.0).dropped == 0
-    return path
+    def make(path: Path) -> None:
+        assert record(hall(), path, 14.0).dropped == 0
+
+    return made_once(tmp_path_factory, "shown", make)
 
 
 @pytest.fixture(scope="session")

@@ -8,6 +8,7 @@ from unittest import mock
 
 import pytest
 
+from tests.forked import made_once
 from tests.hil.machine import TIMEOUT_S
 from tests.recorded import entries_of, rewrite
 from tests.runtime.recording.edited_run import record_edited
@@ -34,6 +35,4 @@ def chunked_run(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session", params=["bayes", "paper"])
 def edited(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the recording of a run with every kind of edit, by each method."""
-    path = tmp_path_factory.mktemp("edited") / "hall.mcap"
-    record_edited(path, request.param)
-    return path
+    return made_once(tmp_path_factory, f"edited-{request.param}", lambda path: record_edited(path, request.param))

@@ -107,6 +107,8 @@ def test_an_echo_proves_its_own_line_and_elsewhere_little(
     for place in range(1, 9):
         for _ in range(5):  # repeats from one place are one reading
             lines.observe(fire([r, math.nan, math.nan], 0.0, 0.05), bearings, place, nothing)
+        if place not in {1, PLACES_MIN - 1, PLACES_MIN, 8}:
+            continue
         among_mirrors, elsewhere = (lines.crossed(mirrors)[64, 64 + 12] for mirrors in (1.0, 0.0))
         assert among_mirrors == has_line
         assert elsewhere == (has_line or (has_count and place >= PLACES_MIN))
