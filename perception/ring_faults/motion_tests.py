@@ -41,7 +41,7 @@ from perception.ring_faults.repeats import (
     weigh_repeat,
 )
 from perception.ring_faults.replays import PAST_LOOKS, PastLooks, weigh_replay
-from perception.sensor_faults.wall import NOISE_SHARE
+from perception.sensor_faults.wall import NOISE_SHARE, fits_unseen_wall
 from perception.sensor_mounts import RingPose
 
 EVIDENCE_NAT: Final = math.log(1e7 / 0.002)
@@ -222,8 +222,9 @@ def weigh_change(
 
     A surface whose normal lies in the beam comes nearer by d·cos ψ, for an angle ψ from the motion to a direction in
     the beam. A rough one that the beam grazes may change otherwise, hence `FOLLOWS`; a rough wall along the path
-    says nothing. Sensors whose beams overlap hear the same surface, and together count as one. How a ring is mounted
-    does not change on the way, so evidence for the robot file counts, too: this sum may fall below zero.
+    says nothing, nor what may be one where no sensor sees it. Sensors whose beams overlap hear the same surface, and
+    together count as one. How a ring is mounted does not change on the way, so evidence for the robot file counts,
+    too: this sum may fall below zero.
 
     Parameters
     ----------
@@ -247,10 +248,13 @@ def weigh_change(
     moved = math.hypot(dx, dy)
     if moved < 2.0 * max(STEP_MIN_M, 3.0 * tolerance):
         return
-    if is_parallel_wall(i, r, (dx, dy), yaw, mounts, reception, LEAN_RAD, echoes, all_of.path_m):
+    change, error, path = r - c.anchor.range_m, tolerance + 0.03 * r, math.atan2(dy, dx)
+    is_grazed = fits_unseen_wall(
+        wrapped(axis - path), change, moved, wrapped(yaw - path), mounts, half_angle, (error, LEAN_RAD)
+    )
+    if is_grazed or is_parallel_wall(i, r, (dx, dy), yaw, mounts, reception, LEAN_RAD, echoes, all_of.path_m):
         mark(c.anchor, r, x, y, axis, all_of.path_m)
         return
-    change, error, path = r - c.anchor.range_m, tolerance + 0.03 * r, math.atan2(dy, dx)
     elsewhere = (1.0 - FOLLOWS) / (2.0 * (MOVES * moved + error))
     mounted = 0.0
     for quarter in range(QUARTERS + 1):

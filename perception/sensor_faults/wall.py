@@ -15,6 +15,9 @@ BESIDE_MIN_M: Final = 0.5
 NOISE_SHARE: Final = 0.04
 """A neighbour's reading has changed only beyond the tolerance and this share: four deviations of 1 % noise."""
 
+SQUARE_MIN: Final = 0.94
+"""Least sine of the angle from the path at which a sensor hears a wall along it nearly as one square to it does."""
+
 
 @kernel
 def towards_wall(axis: float, half_angle: float) -> float:
@@ -28,6 +31,49 @@ def towards_wall(axis: float, half_angle: float) -> float:
         Half the beam's width, rad.
     """
     return min(max(0.5 * math.pi, axis - half_angle), axis + half_angle)
+
+
+@kernel
+def fits_unseen_wall(
+    axis: float,
+    change: float,
+    moved: float,
+    yaw: float,
+    mounts: Floats,
+    half_angle: float,
+    slack: tuple[float, float],
+) -> bool:
+    """Return whether a range changes as that of a wall along the path does, on a side where no sensor sees one.
+
+    A ring that only looks ahead has no sensor square to the path that would hear how far away the wall is. Its beams
+    graze it all the same, and their ranges stay.
+
+    Parameters
+    ----------
+    axis : float
+        Angle of the beam's axis from the path, rad.
+    change, moved : float
+        By how much the range has changed, and the sensor has moved, m.
+    yaw : float
+        Angle of the ring from the path, rad.
+    mounts, half_angle
+        As of `RingSetup`.
+    slack : (float, float)
+        Error of the change, m, and angle between wall and path up to which the wall counts as along the path, rad.
+    """
+    error, lean = slack
+    for turn in range(2):
+        side = 1.0 - 2.0 * turn
+        nearest = towards_wall(side * axis, half_angle)
+        least = min(math.sin(nearest - lean), math.sin(nearest + lean))
+        if least < 1e-3 or abs(change) > error + moved * math.sin(lean) / least:
+            continue
+        is_seen = False
+        for k in range(len(mounts)):
+            is_seen |= math.sin(towards_wall(side * wrapped(yaw + mounts[k, 2]), half_angle)) >= SQUARE_MIN
+        if not is_seen:
+            return True
+    return False
 
 
 @kernel

@@ -290,3 +290,13 @@ def test_a_problem_is_reported_once() -> None:
         problems.append(monitor.take_problem())
     assert problems.count(None) >= len(problems) - 6
     assert REASONS[REPEATED] in problems
+
+
+@pytest.mark.parametrize(("angle", "acoustics"), [(0.0, ROUGH), (0.05, ROUGH), (0.05, CLEAN)])
+def test_a_ring_that_only_looks_ahead_is_honest_beside_rough_walls(angle: float, acoustics: AcousticsConfig) -> None:
+    """Its beams graze the walls of a corridor, whose ranges stay as those of a sensor that looks to the side."""
+    ring = load_settings("room", robot="hobby3").ring
+    walls = tuple(WallConfig(x1_m=-9.0, y1_m=y, x2_m=3.0, y2_m=y) for y in (-0.7, 0.7))
+    along = [(SPEED_M * k - 4.0, angle * (SPEED_M * k - 4.0), angle) for k in range(450)]
+    corridor = WorldConfig(wall=walls, acoustics=acoustics)
+    assert found(ring, firings(ring, corridor, along, seed=900)) is None
