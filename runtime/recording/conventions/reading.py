@@ -25,6 +25,8 @@ FIRST: Final = 20_000
 """Rows on which the decision rests: a quarter of an hour at the rate of most rings, 20 MB."""
 LAG_ROWS: Final = 4000
 """Rows from which the lag of ranges behind poses is found: enough for the lag of most logs to ± 0.02 s."""
+ROUNDING: Final = 1e-12
+"""Least share of the greatest coordinate that counts as a change: some thousand roundings of a double."""
 FIRST_OF_PIPE: Final = 400
 """Rows of a pipe, whose reader waits for the first firing: less than half a minute of most rings."""
 
@@ -221,9 +223,13 @@ def _checked(firings: Iterable[Firing], path: Path) -> Iterator[Firing]:
 
 
 def _table(firings: list[Firing]) -> Table:
-    """Return firings as a table; all have the same number of sensors."""
-    return Table(
-        np.array([one.robot_s for one in firings]),
-        np.array([(one.pose.x, one.pose.y, one.pose.theta, one.ring_yaw) for one in firings]),
-        np.array([one.ranges_m for one in firings]),
-    )
+    """Return firings as a table; all have the same number of sensors.
+
+    Poses are rounded to `ROUNDING` of the greatest: a robot that stands has not moved by what interpolation rounds.
+    """
+    pose = np.array([(one.pose.x, one.pose.y, one.pose.theta, one.ring_yaw) for one in firings])
+    for part in (pose[:, :2], pose[:, 2:]):
+        unit = ROUNDING * float(np.abs(part).max())
+        if unit > 0.0:
+            part[:] = np.round(part / unit) * unit
+    return Table(np.array([one.robot_s for one in firings]), pose, np.array([one.ranges_m for one in firings]))

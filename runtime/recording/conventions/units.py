@@ -143,13 +143,13 @@ def find_units(
     scores = {units: _units_score(units, facts, robot) + ways[units[1:]] for units in choices}
     best = max(scores, key=scores.__getitem__)
     default = Units(*(_choice(one, [plain])[0] for one, plain in zip(given, Units(), strict=True)))
+    if scores[default] > scores[best] - SURE_NAT:
+        best = default
     rate_rad_s = facts.rate / TIMES[best.time]
     if options.angle_unit == "auto" and rate_rad_s > TURNS_FAST * robot.body.turn_max_rad_s:
         raise RingLogError(
             f"{_too_fast(rate_rad_s, robot)}: say --angle-unit deg if it is in degrees, or give it in radians"
         )
-    if scores[default] > scores[best] - SURE_NAT:
-        best = default
     if "auto" in given[1:]:
         _check_ways(best, ratios)
     if best == default:

@@ -392,3 +392,17 @@ def test_a_ring_that_cannot_fire_as_its_file_says_is_good_for_a_log(tmp_path: Pa
     robot = load_settings(robot=str(tmp_path / "eleven.toml"))
     rows = [Firing(0.1 * k, Pose(0.02 * k, 0.0, 0.0), 0.0, np.full(11, 2.0 + 0.01 * k)) for k in range(60)]
     assert list(converted_firings(rows, Path("log.csv"), robot, RingLogOptions(), pytest.fail)) == rows
+
+
+def test_a_robot_that_stands_has_not_moved_by_what_interpolation_rounds() -> None:
+    drive = make_drive(3, "p3dx", "room", "specular", 40.0)
+    stands = len(drive.t) // 4
+    pose = np.where(np.arange(len(drive.t))[:, None] < stands, drive.pose, drive.pose[stands])
+    pose[stands:, :2] += 1e-16 * (np.arange(len(pose) - stands) % 3)[:, None]
+    pose[stands:, 2:] += 0.004 * np.minimum(np.arange(len(pose) - stands), 200)[:, None]
+    assert len(np.unique(pose[stands:, 0])) > 1
+    rows = [
+        Firing(float(t), Pose(*place[:3]), place[3], ranges)
+        for t, place, ranges in zip(drive.t, pose.tolist(), drive.ranges, strict=True)
+    ]
+    assert list(converted_firings(rows, Path("log.csv"), drive.settings, AUTO, pytest.fail)) == rows
