@@ -6,6 +6,8 @@ every package may import `config`.
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from typing import Final
 
 DONE: Final = 0
@@ -27,3 +29,14 @@ class UserError(Exception):
         super().__init__(text)
         if exit_code is not None:
             self.exit_code = exit_code
+
+
+@contextlib.contextmanager
+def naming_file(file: str | None) -> Iterator[None]:
+    """Begin the message of an error with the file that it is about, unless that is None or the message names it."""
+    try:
+        yield
+    except UserError as error:
+        if file is None or file in str(error):
+            raise
+        raise UserError(f"{file}: {error}", error.exit_code) from error

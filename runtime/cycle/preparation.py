@@ -159,7 +159,7 @@ class RunningPreparation:
                     is_connected = True
                 now_s = asyncio.get_running_loop().time()
                 if now_s - said_s >= PROGRESS_PERIOD_S:
-                    said_s, so_far = now_s, f"{now_s - begin_s:.0f} s so far"
+                    said_s, so_far = now_s, f"waiting for {now_s - begin_s:.0f} s"
                     text = f"{preparation.progress}; the robot is connected after that ({so_far})"
                     self._log.info(text)
                     if self._on_starting is not None:

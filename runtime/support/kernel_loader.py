@@ -273,7 +273,7 @@ def progress_text(done: int, expected: int, elapsed_s: float, what: str = PREPAR
     """
     text = f"{what}: {done} of {expected} kernels"
     if done >= expected or done < expected * SHARE_MIN:
-        return text
+        return f"{text}, {elapsed_s:.0f} s so far"
     return f"{text}, about {max(1.0, elapsed_s * (expected - done) / done):.0f} s left"
 
 

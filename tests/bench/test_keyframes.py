@@ -85,8 +85,8 @@ def test_each_robot_drives_a_little_and_no_keyframe_is_refused(seed: int) -> Non
 @pytest.mark.parametrize(
     ("run", "robot", "seconds", "sets"),
     [
-        ("office", "denning", 24.0, ()),
-        ("room", "p3dx", 24.0, ("perception.grid.method=off",)),
+        ("office", "denning", 12.0, ()),
+        ("room", "p3dx", 12.0, ("perception.grid.method=off",)),
         ("room", "ears", 12.0, ("perception.grid.method=elfes",)),
     ],
 )
@@ -95,7 +95,7 @@ def test_no_keyframe_of_the_shipped_runs_is_refused(
 ) -> None:
     mission = "round-the-room" if run == "room" else None
     settings = load_settings(run, sets, robot=robot, mission=mission)
-    check(adopt_all(settings, 0, seconds, 12.0), seconds, 12.0)
+    check(adopt_all(settings, 0, seconds, 6.0), seconds, 6.0)
 
 
 def test_a_refused_keyframe_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

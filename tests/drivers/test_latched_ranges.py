@@ -38,7 +38,7 @@ def period(rows: Floats) -> int:
     return detector.period
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.soak) for k in (1, 2))])
 @pytest.mark.parametrize("step_m", [0.001, 0.01, 0.03048])
 @pytest.mark.parametrize("noise_m", [0.0, 0.005, 0.03])
 def test_no_honest_ring_is_taken_for_latched(step_m: float, noise_m: float, seed: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from config.errors import DONE, WRONG_CALL, UserError
+from config.errors import DONE, WRONG_CALL, UserError, naming_file
 from runtime.cli.options import Sets
 
 
@@ -45,9 +45,10 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
         )
     settings = load_any(config, sets)
     if isinstance(settings, Settings):
-        refuse_undrivable(settings)
-        refuse_blind_ways(settings)
-        check_places(settings.mission, settings.places)
+        with naming_file(config):
+            refuse_undrivable(settings)
+            refuse_blind_ways(settings)
+            check_places(settings.mission, settings.places)
         for text in lint_settings(settings):
             sys.stdout.write(f"{config}: {text}\n")
         if (own := plugged_table(settings.robot.driver)) is not None:

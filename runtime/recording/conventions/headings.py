@@ -12,6 +12,7 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from config.robot import RobotConfig
 from drivers.messages import Floats
@@ -38,6 +39,8 @@ ROWS: Final = 128
 BLOCKS: Final = 20
 KERNEL_M: Final = 0.15
 """Width of an echo's density, m: what a beam leaves open at a metre or two."""
+FAR: Final = 1e9
+"""Greatest distance in widths of the density: its cube is a number in single precision."""
 SURE: Final = 4.5
 """Standard errors by which a convention must explain the echoes better. Over 20 clean drives, the mirrored one was
 worse by 8 at least."""
@@ -202,9 +205,10 @@ def echo_scores(
         rows, sensors = rows[chosen], sensors[chosen]
     mounts = np.array(robot.ring.mounts)[sensors]
     reach = mounts_per_unit * table.ranges[rows, sensors]
+    poses = from_middle(table.pose)[rows]
     scores = {}
     for one in choices:
-        px, py = echo_places(table.pose[rows], one, mounts, reach, mounts_per_unit * length_per_range)
+        px, py = echo_places(poses, one, mounts, reach, mounts_per_unit * length_per_range)
         near = np.empty(len(px))
         for begin in range(0, len(px), ROWS):  # those before it and, of its own, the earlier ones
             end = begin + ROWS
@@ -217,24 +221,40 @@ def echo_scores(
     return scores
 
 
-def nearness(px: Floats, py: Floats, x: Floats, y: Floats, kernel_m: float) -> Floats:
+def from_middle(pose: Floats) -> Floats:
+    """Return poses with x and y counted from their median, near which single precision is exact enough.
+
+    Parameters
+    ----------
+    pose : (rows, 4) float
+        In the file's units.
+    """
+    moved = pose.copy()
+    moved[:, :2] -= np.median(pose[:, :2], axis=0)
+    return moved
+
+
+def nearness(px: Floats, py: Floats, x: Floats, y: Floats, kernel_m: float) -> NDArray[np.float32]:
     """Return how near each place is to each other one, (1 + d²/w²)^-3/2, (places, others); 1 where they are one.
+
+    It takes nearly all of the time, and in single precision a sixth of that in double: sums of a thousand differ by
+    1e-6 of themselves.
 
     Parameters
     ----------
     px, py : (places,) float
-        m.
+        m, counted from where the robot was: see `from_middle`.
     x, y : (others,) float
         m.
     kernel_m : float
         Width w of an echo's density.
     """
-    spread, across = np.subtract.outer(px, x), np.subtract.outer(py, y)
+    px1, py1, x1, y1 = (np.clip(each / kernel_m, -FAR, FAR).astype(np.float32) for each in (px, py, x, y))
+    spread, across = np.subtract.outer(px1, x1), np.subtract.outer(py1, y1)
     spread *= spread
     across *= across
     spread += across
-    spread *= kernel_m**-2
-    spread += 1.0
+    spread += np.float32(1.0)
     spread *= np.sqrt(spread, out=across)
     return np.reciprocal(spread, out=spread)
 

@@ -18,6 +18,7 @@ from runtime.recording.conventions.headings import (
     Angles,
     echo_places,
     echo_scores,
+    from_middle,
     mirror_image,
     nearness,
     sureness,
@@ -243,18 +244,19 @@ def _fits(
         The columns that count as others; all if not given.
     """
     mounts, (range_m, length_m) = np.array(robot.ring.mounts), units
+    pose = from_middle(table.pose)
     rng = np.random.default_rng(0)
     rows, columns = np.nonzero(np.isfinite(table.ranges))
     some = np.arange(len(rows)) if among is None else np.flatnonzero(among[columns])
     some = rng.permutation(some)[:PLACED]
     reach = range_m * table.ranges[rows[some], columns[some]]
-    x, y = echo_places(table.pose[rows[some]], way, mounts[order[columns[some]]], reach, length_m)
+    x, y = echo_places(pose[rows[some]], way, mounts[order[columns[some]]], reach, length_m)
     fits = []
     for column in range(len(mounts)):
         own, others = rows[columns == column], columns[some] != column
         own = np.sort(rng.permutation(own)[:EACH])
         reach = range_m * table.ranges[own, column]
-        px, py = echo_places(table.pose[own], way, mounts[:, None], reach, length_m)
+        px, py = echo_places(pose[own], way, mounts[:, None], reach, length_m)
         near = [nearness(*places, x[others], y[others], KERNEL_M).sum(axis=1) for places in zip(px, py, strict=True)]
         density = np.array(near) / max(1, int(others.sum()))
         fits.append(np.log(density + 1e-3))

@@ -155,6 +155,7 @@ def heard(family: Family, kind: str, **values: Any) -> Iterator[tuple[int, list[
         yield sensor, column[~np.isnan(column)].tolist()
 
 
+@pytest.mark.compiled
 def test_each_family_reports_the_lies_of_its_sensors(family: Family) -> None:
     assert {len(set(ranges)) for _, ranges in heard(family, "frozen_ring")} == {1}
     assert {range_m for _, ranges in heard(family, "silent_ring") for range_m in ranges} == {math.inf}

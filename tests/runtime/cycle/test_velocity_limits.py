@@ -115,8 +115,8 @@ def wandering(seed: int) -> MissionConfig:
 def test_neither_wander_nor_an_operator_enters_a_zone(seed: int) -> None:
     places = random_places(np.random.default_rng(100 + seed))
     given = ROOM.model_copy(update={"places": places})
-    assert least_gap_m(with_mission(given, wandering(seed)), seed, 40.0)[0] > -STOPPING_ERROR_M
-    assert least_gap_m(given, seed, 40.0, teleoperated=True)[0] > -STOPPING_ERROR_M
+    assert least_gap_m(with_mission(given, wandering(seed)), seed, 25.0)[0] > -STOPPING_ERROR_M
+    assert least_gap_m(given, seed, 25.0, teleoperated=True)[0] > -STOPPING_ERROR_M
 
 
 @pytest.mark.soak

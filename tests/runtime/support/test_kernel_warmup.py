@@ -317,7 +317,7 @@ def added_in(script: str, *words: str) -> str:
 @pytest.mark.parametrize(
     ("sets", "models", "further"),
     [
-        ("perception.method=bayes", "semicircle", "keg.toml"),
+        pytest.param("perception.method=bayes", "semicircle", "keg.toml", marks=pytest.mark.soak),  # with drift, too
         ("perception.method=bayes", "semicircle box", "hexagon.toml"),
         ("perception.localization.correct_drift=true", "semicircle", "keg.toml"),
         ("perception.method=paper", "semicircle", "box"),

@@ -312,7 +312,7 @@ async def _whole_run(
         from runtime.support.kernel_loader import begin_preparation
         from runtime.timing.time_control import NoTimeControl
 
-        refuse_impossible(settings)
+        refuse_impossible(settings, plan.files.file)
         preparation = begin_preparation(settings)
         recording = stack.enter_context(
             open_run_recording(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from config.errors import WRONG_CALL, UserError
+from config.errors import WRONG_CALL, UserError, naming_file
 from config.files import is_utf8, one_line, utf8
 from config.load import ConfigError, list_shipped, load_settings, load_world, with_goal, with_known_room
 from config.mission_step import Frame
@@ -61,6 +61,11 @@ class SettingsFiles:
         """Whether a run file or an option says which robot it is."""
         return self.config is not None or self.robot is not None
 
+    @property
+    def file(self) -> str | None:
+        """The file that says what the robot is; None if it is the default."""
+        return self.robot or self.config
+
     def read(self) -> Settings:
         """Return the settings as the files are now, on the port that they name.
 
@@ -75,7 +80,7 @@ class SettingsFiles:
             No robot can carry them out.
         """
         settings = self.read_unchecked()
-        refuse_impossible(settings)
+        refuse_impossible(settings, self.file)
         return settings
 
     def read_unchecked(self) -> Settings:
@@ -128,8 +133,8 @@ class SettingsFiles:
         return settings if port is None else with_port(settings, port)
 
 
-def refuse_impossible(settings: Settings) -> None:
-    """Refuse settings that no robot can carry out; this imports the most of perception.
+def refuse_impossible(settings: Settings, file: str | None = None) -> None:
+    """Refuse settings that no robot can carry out, and name their file; this imports the most of perception.
 
     Raises
     ------
@@ -139,14 +144,15 @@ def refuse_impossible(settings: Settings) -> None:
     from runtime.support.blind_sides import refuse_blind_ways
     from runtime.support.pattern_check import refuse_undrivable
 
-    if settings.body == NO_BODY:
-        raise UserError(
-            "body: the robot file describes none, so it is good for replays, stands and maps only; to drive, add a "
-            "[body] with radius_m, speed_max_m_s and turn_max_rad_s",
-            WRONG_CALL,
-        )
-    refuse_undrivable(settings)
-    refuse_blind_ways(settings)
+    with naming_file(file):
+        if settings.body == NO_BODY:
+            raise UserError(
+                "body: the robot file describes none, so it is good for replays, stands and maps only; to drive, add "
+                "a [body] with radius_m, speed_max_m_s and turn_max_rad_s",
+                WRONG_CALL,
+            )
+        refuse_undrivable(settings)
+        refuse_blind_ways(settings)
 
 
 def parse_goal(text: str, frame: Frame, settings: Settings) -> GoalConfig:

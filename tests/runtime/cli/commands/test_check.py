@@ -78,6 +78,18 @@ def test_a_line_too_slow_or_ranges_finer_than_it_are_wrong(capsys: pytest.Captur
         assert said in err
 
 
+def test_what_only_all_values_together_make_wrong_is_said_of_a_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """ "25 sensors do not divide by 8" named none."""
+    robot, run = tmp_path / "mine.toml", tmp_path / "run.toml"
+    robot.write_text((ROOT / "config/robots/denning.toml").read_text().replace("count = 24", "count = 25"))
+    run.write_text('robot = "mine.toml"\n')
+    for words in (["check", str(robot)], ["check", str(run)], ["run", "--headless", "--robot", str(robot)]):
+        assert run_command(words) == WRONG_CALL
+        assert capsys.readouterr().err.startswith(f"echolocate: {words[-1]}: ring.firing: preset ")
+
+
 @pytest.mark.parametrize("name", ["drive.csv", "runs/drive.mcap"])
 def test_data_of_a_run_are_no_configuration(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     """A ring log was "no such run", and by its path an invalid key in line 1."""

@@ -6,6 +6,7 @@ from collections.abc import MutableMapping
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
+import numpy as np
 import structlog
 
 from config.load import load_settings
@@ -163,6 +164,15 @@ def test_a_fifth_of_corrupt_frames_is_one_line_with_the_rate() -> None:
     run_noisy(case, 20.0, 5, 0)
     run_noisy(case, 20.0, 4, 1)
     assert len(case.events) == 2, "once more after it was good"
+
+
+def test_a_fifth_of_a_pioneers_few_frames_is_one_line() -> None:
+    case, rng = Case(), np.random.default_rng(10)
+    for bad in rng.random(6000) < 0.2:
+        run_noisy(case, 2.0 * CYCLE_S, 0, 0)
+        counts = case.driver.counts
+        case.driver.counts = LinkCounts(counts.frames + (not bad), counts.bad + bad, 0)
+    assert len(case.events) == 1, "in ten minutes"
 
 
 def test_a_flood_of_valid_frames_that_disturbs_no_cycle_is_one_line_with_the_rate() -> None:

@@ -129,7 +129,10 @@ OF_EACH_KIND = ("denning", "p3dx", "b21r", "hobby3", "servo1")
 ROBOTS = tuple(name for name in list_shipped("robots") if load_robot(name).robot.driver != "ros2")
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+EACH_ROBOT = [pytest.param(one, marks=[] if one in OF_EACH_KIND else [pytest.mark.soak]) for one in ROBOTS]
+
+
+@pytest.mark.parametrize("robot", EACH_ROBOT)
 def test_every_shipped_robot_is_tested_and_a_sensor_that_reads_what_it_cannot_is_found(
     robot: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -150,9 +153,7 @@ def test_every_shipped_robot_is_tested_and_a_sensor_that_reads_what_it_cannot_is
         assert code == FAILED or "hears nothing" in found
 
 
-@pytest.mark.parametrize(
-    "robot", [pytest.param(one, marks=[] if one in OF_EACH_KIND else [pytest.mark.soak]) for one in ROBOTS]
-)
+@pytest.mark.parametrize("robot", EACH_ROBOT)
 def test_the_motors_of_every_shipped_robot_are_good(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
     code, lines = reports_of(robot, monkeypatch, move=True)
     assert code == DONE, lines
@@ -211,7 +212,6 @@ def test_a_dead_sensor_of_the_real_firmware_is_found(plugged: list[str], capsys:
     assert not any(line.startswith("motors ") for line in lines), "no wheel has turned"
 
 
-@pytest.mark.soak
 @pytest.mark.soak
 @pytest.mark.parametrize("plugged", [""], indirect=True)
 def test_the_motors_of_the_real_firmware(plugged: list[str], capsys: pytest.CaptureFixture[str]) -> None:
