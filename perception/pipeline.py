@@ -284,9 +284,13 @@ class Perception:
         """Return each sensor's last echo if no older than `age_max_s` at the robot's time: shape (k, 2), m."""
         return self._echoes.points(robot_s, age_max_s)
 
-    def steady_obstacles(self, robot_s: float, age_max_s: float) -> Floats:
-        """Return those of the obstacles with which another look agrees: shape (k, 2), m."""
-        return self._echoes.steady_points(robot_s, age_max_s)
+    def steady_obstacles(self, robot_s: float, age_max_s: float, pose: Pose) -> Floats:
+        """Return those of the obstacles with which another look, or what is recognised, agrees: shape (k, 2), m."""
+        return self._with_feet(self._echoes.steady_points(robot_s, age_max_s), pose)
+
+    def _with_feet(self, points: Floats, pose: Pose) -> Floats:
+        """Return places of echoes, and the feet of near objects that none of them stands for."""
+        return with_unheard_feet(points, self.near_objects(), self._models, pose, farthest_m(self._ring.mounts))
 
     @property
     def unheard(self) -> UnheardEchoes:
@@ -309,14 +313,12 @@ class Perception:
         age_max_s : float
             Longest age at which a direction counts as seen, s.
         """
-        bearings, ages, sensor_ages, points = self._echoes.looks(robot_s, age_max_s)
+        bearings, ages, since, echoes = self._echoes.looks(robot_s, age_max_s)
         axes = ring_yaw + self._axes
         if self._turning:
             axes[self._turning] += pose.theta - ring_yaw
-        points = with_unheard_feet(points, self.near_objects(), self._models, pose, farthest_m(self._ring.mounts))
-        points, *sides = self._echoes.with_blind_sides(points, pose, axes)
-        view = FieldOfView(bearings, ages, axes, sensor_ages, self._half_angle, self._reach_m, age_max_s, *sides)
-        return view, points
+        points, *sides = self._echoes.with_blind_sides(self._with_feet(echoes, pose), pose, axes)
+        return FieldOfView(bearings, ages, axes, since, self._half_angle, self._reach_m, age_max_s, *sides), points
 
     def canyons(self) -> tuple[Canyon, ...]:
         """Return the box canyons found so far, in odometry's frame, those left behind included."""

@@ -346,7 +346,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             objects,
             occupancy=state.perception.occupancy(),
             canyons=state.perception.canyons(),
-            steady=state.perception.steady_obstacles(now_s, age_max_s),
+            steady=state.perception.steady_obstacles(now_s, age_max_s, odometry.pose),
         )
     if (zones := state.zones) is not None:
         percept, state.hold_reason = zones.seen(percept, state.drive_request, settings.body.radius_m)

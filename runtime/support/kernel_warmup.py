@@ -107,7 +107,7 @@ def _ring(settings: Settings) -> None:
     looks = Wiring(np.zeros((1, LOOKS, LOOK_FIELDS)), np.zeros(1, np.int64), np.zeros((1, 1)))
     weigh_turn(mounts, (0.2, 0.1, 1.0), looks, np.zeros((LOOKS, 3)), np.zeros((1, 2)))
     miss_share(records(SensorMemory, zeros(SensorMemory, 1))[0], records(RingMemory, zeros(RingMemory, 1))[0])
-    perception.steady_obstacles(0.1 * WARM_UP_FIRINGS, 1.0)
+    perception.steady_obstacles(0.1 * WARM_UP_FIRINGS, 1.0, Pose(0.0, 0.0, 0.0))
     perception.unheard.take_ahead(Pose(0.0, 0.0, 0.0), 1.0, 1.0)
     perception.unheard.points()
 

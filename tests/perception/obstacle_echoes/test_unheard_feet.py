@@ -58,7 +58,7 @@ def test_a_near_object_is_an_obstacle_where_no_echo_says_so() -> None:
     np.testing.assert_allclose(
         with_unheard_feet(elsewhere, [drum], [DRUM], here, 0.3), [elsewhere[0], foot], atol=1e-12
     )
-    heard = np.array([[foot[0], 0.05]])
+    heard = np.array([[foot[0], 0.04]])
     assert with_unheard_feet(heard, [drum], [DRUM], here, 0.3) is heard
 
 
