@@ -59,7 +59,7 @@ KERNEL_COUNTS: Final = MappingProxyType(
         LOCALIZATION: 14,
         KNOWN_ROOM: 29,
         VALLEY: 2,
-        SURFACES: 53,
+        SURFACES: 56,
         ECHO_LAG: 5,
         "directed": 13,
         "moravec_elfes": 6,

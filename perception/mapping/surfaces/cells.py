@@ -366,3 +366,19 @@ def strength_of(cells: CellCounts, i: int, j: int) -> float:
         strength += direction_strength(heard)
         is_answering = is_answering or (heard > 0 and answer_probability(cells, i, j, b) > ANSWER_MIN)
     return strength * math.sqrt(min(own, 1.0)) if is_answering else 0.0
+
+
+@kernel
+def passes_of_heard(cells: CellCounts, b: int, i: int, j: int, hits: int) -> int:
+    """Return how many ranges passed a cell in a direction that hears it, in parts of `WHOLE`.
+
+    Parameters
+    ----------
+    cells : CellCounts
+        The cells.
+    b, i, j : int
+        The direction, row and column.
+    hits : int
+        What that direction hears there, in parts of `WHOLE`: passes count less where it is less than an echo.
+    """
+    return int(cells.passes[b, i >> 1, j >> 1] * min(hits, WHOLE) // WHOLE_PASS)

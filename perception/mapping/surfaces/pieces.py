@@ -6,19 +6,29 @@ import math
 from typing import Final
 
 from perception.kernel import Floats, Ints, kernel, loop_kernel
-from perception.mapping.surfaces.cells import CELLS_A_M, cell_of, greatest_strength, strength_of
+from perception.mapping.surfaces.cells import (
+    CELLS_A_M,
+    cell_of,
+    greatest_strength,
+    hits_around,
+    passes_of_heard,
+    strength_of,
+)
 from perception.mapping.surfaces.parameters import (
     CELL_M,
     CELLS,
     COVERED_MIN,
+    DIRECTIONS,
     END_STRENGTH,
     GAP_M,
+    NODE_CELLS,
     OFF_LINE_M,
     PIECE_MIN_M,
     STRENGTH_MIN,
     SURFACE_CELLS_MAX,
     TAKEN_M,
     WEAK_MIN,
+    WHOLE,
 )
 from perception.mapping.surfaces.records import (
     ANGLES,
@@ -316,10 +326,20 @@ def take(room: LocalMap, counts: CellCounts, number: int) -> None:
             cell = room.cells[counts.index[i, j] - 1]
             if cell.owner == FREE:
                 cell.owner = number
+                count_answers(room, counts, i, j)
             if cell.strength > END_STRENGTH:
                 t = (offset_of(i) - piece.x) * piece.ux + (offset_of(j) - piece.y) * piece.uy
                 low, high = min(low, t - 0.5 * CELL_M), max(high, t + 0.5 * CELL_M)
     piece.low, piece.high = max(low, piece.low), min(high, piece.high)
+
+
+@kernel
+def count_answers(room: LocalMap, counts: CellCounts, i: int, j: int) -> None:
+    """Add a piece's cell to what says how often the surfaces of this map answer to a direction that hears them."""
+    for b in range(DIRECTIONS):
+        hits = hits_around(counts, b, i, j, NODE_CELLS)
+        room.heard += hits / WHOLE
+        room.passed += passes_of_heard(counts, b, i, j, hits) / WHOLE
 
 
 @kernel

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from perception.kernel import kernel
-from perception.mapping.surfaces.cells import direction_strength, hits_around
+from perception.mapping.surfaces.cells import LEAST_READINGS, direction_strength, hits_around, passes_of_heard
 from perception.mapping.surfaces.parameters import (
     CELL_M,
     CELLS,
     DIRECTIONS,
+    ECHO_NAT,
     LINK_M,
     NODE_CELLS,
     NODE_M,
@@ -35,6 +37,7 @@ def choose_nodes(room: LocalMap, counts: CellCounts, begin: int, end: int) -> No
     begin, end : int
         Which cells, in order of their strength.
     """
+    nat = pass_nat(room)
     for at in range(begin, end):
         cell = room.cells[counts.order[at]]
         if not is_unclaimed(room, cell):
@@ -46,7 +49,7 @@ def choose_nodes(room: LocalMap, counts: CellCounts, begin: int, end: int) -> No
                 is_near = (i - cell.i) ** 2 + (j - cell.j) ** 2 < APART * APART
                 if n >= 0 and is_near and room.cells[n].owner == NODE:
                     is_apart = False
-        if is_apart and is_agreed(counts, cell):
+        if is_apart and is_agreed(counts, cell, nat):
             cell.owner = NODE
 
 
@@ -66,14 +69,34 @@ def is_unclaimed(room: LocalMap, cell: SurfaceCell) -> bool:
 
 
 @kernel
-def is_agreed(counts: CellCounts, cell: SurfaceCell) -> bool:
-    """Return whether two directions' echoes agree on a cell and those around it: strays come one by one."""
-    strength = 0.0
+def pass_nat(room: LocalMap) -> float:
+    """Return the log odds of a surface after a range passed it, nat: what answers as the pieces of this map do.
+
+    Pieces that answer at any angle are hardly ever passed, mirrors mostly.
+    """
+    passed = room.passed + LEAST_READINGS
+    return math.log(passed / (room.heard + passed))
+
+
+@kernel
+def is_agreed(counts: CellCounts, cell: SurfaceCell, nat: float) -> bool:
+    """Return whether two directions' echoes agree on a cell and those around it: strays come one by one.
+
+    Ranges that passed it in these directions must not say more than the echoes do.
+
+    Parameters
+    ----------
+    counts, cell
+        The map's counts, and the cell.
+    nat : float
+        From `pass_nat`.
+    """
+    strength, passes = 0.0, 0.0
     for b in range(DIRECTIONS):
-        strength += direction_strength(hits_around(counts, b, cell.i, cell.j, NODE_CELLS))
-        if strength >= NODE_STRENGTH:
-            return True
-    return False
+        hits = hits_around(counts, b, cell.i, cell.j, NODE_CELLS)
+        strength += direction_strength(hits)
+        passes += direction_strength(passes_of_heard(counts, b, cell.i, cell.j, hits))
+    return bool(strength >= NODE_STRENGTH and strength * ECHO_NAT + passes * nat > 0.0)
 
 
 @kernel

@@ -223,3 +223,4 @@ def end_search(rooms: Records[LocalMap], every: Records[CellCounts]) -> None:
         point.x, point.y, point.piece = 0.0, 0.0, 0
     room.chains[: room.chained] = 0
     room.phase, room.at, room.cell_count, room.piece_count, room.chained = IDLE, 0, 0, 0, 0
+    room.heard, room.passed = 0.0, 0.0

@@ -16,6 +16,7 @@ from perception.mapping.surfaces.parameters import (
     STRENGTH_MIN,
     SURFACE_CELLS_MAX,
     WHOLE,
+    WHOLE_PASS,
 )
 from perception.mapping.surfaces.pieces import (
     ROW_PARTS,
@@ -183,3 +184,17 @@ def test_the_direction_through_a_seed_meets_most_cells() -> None:
 
 def test_places_of_cells() -> None:
     assert offset_of(CELLS // 2) == pytest.approx(0.5 * CELL_M)
+
+
+def test_the_cells_of_pieces_say_how_often_surfaces_answer() -> None:
+    """A wall is heard from six directions. In one of them each range of its left half passed three times."""
+    along = np.arange(-1.0, 1.0, CELL_M) + 0.5 * CELL_M
+    room, local, counts = mapped(np.column_stack([along, np.full(len(along), 0.5 * CELL_M)]))
+    passed = counts["passes"][0]
+    passed[0, CELLS // 4 - 10 : CELLS // 4, CELLS // 4] = 3 * WHOLE_PASS
+    passed[DIRECTIONS - 1] = 5 * WHOLE_PASS  # nothing is heard from there
+    assert grow_all(room[0], records(CellCounts, counts)[0], 10**9)
+    assert local["piece_count"][0] == 1
+    assert room[0].passed == pytest.approx(3.0 * len(along) / 2)
+    # 5 cells around each that are heard, fewer at the ends.
+    assert room[0].heard == pytest.approx(6.0 * (5 * len(along) - 6))

@@ -7,8 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from perception.mapping.surfaces.parameters import CELL_M, CELLS, LINK_M, NODE_M, PIECE_MIN_M, STRENGTH_MIN, WEAK_MIN
-from perception.mapping.surfaces.polylines import chain_all, choose_nodes, is_unclaimed
+from perception.mapping.surfaces.parameters import (
+    CELL_M,
+    CELLS,
+    DIRECTIONS,
+    LINK_M,
+    NODE_M,
+    PIECE_MIN_M,
+    STRENGTH_MIN,
+    WEAK_MIN,
+    WHOLE_PASS,
+)
+from perception.mapping.surfaces.polylines import chain_all, choose_nodes, is_unclaimed, pass_nat
 from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCounts
 from perception.records import records
 from tests.perception.mapping.surfaces.test_pieces import mapped
@@ -60,6 +70,26 @@ def test_weak_cells_are_points_where_more_agree() -> None:
     assert ((strengths > WEAK_MIN) & (strengths < STRENGTH_MIN)).all()
     assert sum(map(len, chains(square, 0.36))) > 0
     assert chains(square[:2], 0.36) == []
+
+
+@pytest.mark.parametrize(("answering", "directions", "is_left"), [
+    (0.9, range(6), False), (0.9, range(6, DIRECTIONS), True), (0.2, range(6), True), (0.9, range(1), True),
+])  # fmt: skip
+def test_passes_speak_against_a_point_where_the_pieces_answer(
+    answering: float, directions: range, is_left: bool
+) -> None:
+    """It is heard from the first six directions, from each by half an echo; two ranges passed in each."""
+    room, local, counts = mapped(np.array([[0.0, 0.0]]), 1.5)
+    counts["passes"][0, list(directions), CELLS // 4, CELLS // 4] = 2 * WHOLE_PASS
+    room[0].heard, room[0].passed = 1000.0 * answering, 1000.0 * (1.0 - answering)
+    assert pass_nat(room[0]) == pytest.approx(math.log(1.0 - answering), abs=0.01)
+    choose_nodes(room[0], records(CellCounts, counts)[0], 0, 1)
+    assert (local["cells"]["owner"][0, 0] == NODE) == is_left
+
+
+def test_passes_say_nothing_before_there_are_pieces() -> None:
+    room, _, _ = mapped(np.array([[0.0, 0.0]]))
+    assert pass_nat(room[0]) == 0.0
 
 
 def test_cells_of_a_piece_that_does_not_reach_them_are_left() -> None:
