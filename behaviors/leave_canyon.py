@@ -112,8 +112,9 @@ def leave_canyon(
     stand = Place(*goal, body_radius_m + PASSAGE_M)
     virtual = _virtual(percept, stand, detour, config)
     near = remember(detour.near, echoes, pose, detour.driven_m, body_radius_m)
-    held = _held(percept, np.concatenate([echoes, places(near)]), stand, config)
-    leaving = _leaving(held, detour.leaving, pose, room)
+    is_free = _free_m(np.concatenate([echoes, places(near)]), pose, bearing, stand.room_m) >= to_goal
+    held = _held(percept, stand, config, is_free=is_free)
+    leaving = _leaving(held, detour.leaving, pose, stand, room, is_free=is_free)
     detour = replace(detour.nearer(to_goal), near=near, leaving=leaving)
     is_held = leaving is not None or len(held) > 0
     waits = waits and detour.side == 0 and not detour.is_held
@@ -125,7 +126,7 @@ def leave_canyon(
     if detour.side == 0:
         if free >= min(to_goal, config.look_m) and not is_held:
             return None, detour
-        detour = _begin(points, pose, stand, percept.canyons, detour, room, config)
+        detour = _begin(points, percept, stand, held, detour, room, config)
     elif not is_held and detour.ends_at(to_goal, free):
         return None, detour.ended()
     else:
@@ -165,10 +166,10 @@ def is_closed(canyon: Canyon, pose: Pose, goal: Place, config: LeaveCanyonConfig
     return not (_is_inside(canyon, pose.x, pose.y) or _has_goal(canyon, goal))
 
 
-def holds(canyon: Canyon, pose: Pose, goal: Place, config: LeaveCanyonConfig) -> bool:
-    """Return whether the robot is inside a canyon that it must leave for its goal."""
-    is_sure = canyon.probability >= config.probability_min
-    return is_sure and _is_inside(canyon, pose.x, pose.y) and not _has_goal(canyon, goal)
+def holds(canyon: Canyon, pose: Pose, goal: Place, config: LeaveCanyonConfig, *, is_free: bool) -> bool:
+    """Return whether the robot is inside a canyon that it must leave for its goal; `is_free`: as far as is heard."""
+    is_inside = canyon.probability >= config.probability_min and _is_inside(canyon, pose.x, pose.y)
+    return is_inside and not _has_goal(canyon, goal) and not (is_free and _is_beside(canyon, goal))
 
 
 def _half_width_m(canyon: Canyon) -> float:
@@ -187,15 +188,8 @@ def _is_inside(
     return -before_m < c * dx + s * dy < depth_m and abs(c * dy - s * dx) < half_m
 
 
-def _held(percept: Percept, heard: Floats, goal: Place, config: LeaveCanyonConfig) -> list[Canyon]:
-    """Return the canyons that the robot must leave for its goal; `heard` (n, 2) is what stands near it, m."""
-    pose = percept.pose
-    held = [canyon for canyon in percept.canyons if holds(canyon, pose, goal, config)]
-    if not held:
-        return held
-    bearing, to_goal = math.atan2(goal.y - pose.y, goal.x - pose.x), math.dist(goal[:2], (pose.x, pose.y))
-    is_free = _free_m(heard, pose, bearing, goal.room_m) >= to_goal
-    return [canyon for canyon in held if not (is_free and _is_beside(canyon, goal))]
+def _held(percept: Percept, goal: Place, config: LeaveCanyonConfig, *, is_free: bool) -> list[Canyon]:
+    return [canyon for canyon in percept.canyons if holds(canyon, percept.pose, goal, config, is_free=is_free)]
 
 
 def _has_goal(canyon: Canyon, goal: Place) -> bool:
@@ -214,14 +208,18 @@ def _is_beside(canyon: Canyon, goal: Place) -> bool:
     return _is_inside(canyon, goal.x, goal.y, beside_m=math.inf)
 
 
-def _leaving(held: list[Canyon], before: Canyon | None, pose: Pose, room_m: float) -> Canyon | None:
+def _leaving(
+    held: list[Canyon], before: Canyon | None, pose: Pose, goal: Place, room_m: float, *, is_free: bool
+) -> Canyon | None:
     """Return the narrow canyon that the robot leaves by its middle line, until its body is outside; None without one.
 
-    Of several that hold it the deepest: the ends of walls are found from the inside outwards.
+    Of several that hold it the deepest: the ends of walls are found from the inside outwards. One that it was leaving
+    need not be left where the goal beside it is seen to be free.
     """
     narrow = [canyon for canyon in held if _half_width_m(canyon) < room_m]
     if before is not None and _is_inside(before, pose.x, pose.y, room_m):
-        narrow.append(before)
+        is_excused = is_free and _is_inside(before, pose.x, pose.y) and _is_beside(before, goal)
+        narrow += [] if is_excused else [before]
     return max(narrow, key=lambda canyon: canyon.depth_m) if narrow else None
 
 
@@ -272,19 +270,20 @@ def _open_sides(points: Floats, pose: Pose, way_rad: float, room_m: float) -> li
 
 def _begin(
     points: Floats,
-    pose: Pose,
+    percept: Percept,
     goal: Place,
-    canyons: tuple[Canyon, ...],
+    held: list[Canyon],
     detour: Detour,
     room_m: float,
     config: LeaveCanyonConfig,
 ) -> Detour:
-    """Return a detour that begins here, on the side that promises the shorter way."""
+    """Return a detour that begins here, on the side that promises the shorter way; `held` canyons are to be left."""
+    pose = percept.pose
     to_goal, bearing = math.hypot(goal.x - pose.x, goal.y - pose.y), math.atan2(goal.y - pose.y, goal.x - pose.x)
 
     def cost(side: Side) -> float:
-        for canyon in canyons:
-            if canyon.probability >= config.probability_min and not _has_goal(canyon, goal):
+        for canyon in percept.canyons:
+            if canyon in held or is_closed(canyon, pose, goal, config):
                 end = _end(canyon, side)
                 return math.dist((pose.x, pose.y), end) + math.dist(end, goal[:2])
         _, heading = _along(points, pose, side, bearing, room_m, config)

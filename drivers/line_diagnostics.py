@@ -80,8 +80,8 @@ def noise(bad: int, what: str) -> str | None:
 def no_answer(what: str, frames: int, heard: HeardBytes) -> str:
     """Return the message for a robot that does not answer a call.
 
-    `what` is the call and how it was made, as "no answer to 3 HELLO commands". `frames` valid ones came lately on the
-    line, and before the bytes of `heard`.
+    `what` is the call and how it was made, as "no answer to 3 HELLO commands". `frames` valid ones came lately;
+    `heard` knows whether any came before.
     """
     if (stranger := heard.stranger) is not None:
         return f"{what}, and {stranger}"

@@ -48,7 +48,12 @@ def open_port(config: LinkConfig) -> Port:
 
 def is_missing(config: LinkConfig) -> bool:
     """Return whether there is no such serial port, as when the robot is not plugged in."""
-    return config.port is not None and not is_tcp(config.port) and not Path(config.port).exists()
+    if config.port is None or is_tcp(config.port):
+        return False
+    try:
+        return not Path(config.port).exists()
+    except OSError:  # no permission, or too long a name: opening it says so
+        return False
 
 
 _IN_USE = (errno.EAGAIN, errno.EBUSY, errno.EWOULDBLOCK)

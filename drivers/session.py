@@ -13,8 +13,8 @@ from drivers.heard_bytes import HeardBytes
 from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
 from drivers.stamper import Stamper
 
-GAPS_MIN: Final = 2
-"""So many gaps in a row, with a single sample between them, are no restart and no replugged cable."""
+GAPS_MIN, LATEST = 2, 3
+"""So many gaps among the latest times between two samples are no restart and no replugged cable."""
 FIRINGS_MAX: Final = 1024
 """Firings kept if they are not taken; the oldest are dropped. At 20 firings a second this is almost a minute."""
 
@@ -31,7 +31,8 @@ RARE: Final = (
 class OdometryGaps:
     """Detects odometry that comes too rarely: each sample would raise the line, and the wait for the next lower it.
 
-    A restart or a loose cable makes one gap, and samples follow each other after it.
+    A restart or a loose cable makes one gap, and samples follow each other after it. Times are those of the looks, so
+    that a gap is one in which a look found nothing for too long.
 
     Parameters
     ----------
@@ -41,23 +42,33 @@ class OdometryGaps:
 
     def __init__(self, longest_s: float) -> None:
         self._longest_s = longest_s
-        self._looked_s = self._sample_s = -math.inf
-        self._gaps, self._gap_s = 0, 0.0
-        """Gaps in a row, and the last of them, s."""
+        self._looked_s = -math.inf
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget all samples, as for a line that has just been opened."""
+        self._sample_s = -math.inf
+        self._are_gaps: deque[bool] = deque(maxlen=LATEST)
+        """Which of the latest times between samples are gaps."""
+        self._gap_s, self._is_rare = 0.0, False
+        """The last gap, s; whether there were too many, until there is none."""
 
     def look(self, run_s: float, *, came: bool) -> None:
         """Take whether a sample came since the last look; after a long time without a look, gaps say nothing."""
-        late, self._looked_s = run_s - self._looked_s > 0.5 * self._longest_s, run_s
-        if late:
-            self._gaps, self._sample_s = 0, -math.inf
+        before_s, self._looked_s = self._looked_s, run_s
+        if run_s - before_s > self._longest_s:
+            self.begin()
         elif came:
-            gap_s, self._sample_s = run_s - self._sample_s, run_s
-            is_gap = self._longest_s < gap_s < math.inf
-            self._gaps, self._gap_s = (self._gaps + 1, gap_s) if is_gap else (0, 0.0)
+            is_gap = self._longest_s < before_s - self._sample_s < math.inf
+            self._gap_s = run_s - self._sample_s if is_gap else self._gap_s
+            self._sample_s = run_s
+            self._are_gaps.append(is_gap)
+            gaps = sum(self._are_gaps)
+            self._is_rare = gaps > 0 and (self._is_rare or gaps >= GAPS_MIN)
 
     def problem(self, run_s: float) -> str | None:
         """Return what is wrong where the last samples came too rarely and the next is not long overdue."""
-        if self._gaps < GAPS_MIN or run_s - self._sample_s > 2.0 * self._gap_s:
+        if not self._is_rare or run_s - self._sample_s > 2.0 * self._gap_s:
             return None
         return RARE.format(self._longest_s, 0.5 * self._longest_s)
 

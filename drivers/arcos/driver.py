@@ -96,9 +96,9 @@ class ArcosDriver(Session[PoseStamper]):
     def problem(self) -> str | None:
         """What is wrong, in one line; None if nothing is."""
         moving_s = self._halting.moving_s(self._run_s)
-        if self._state is LineState.READY and moving_s > self._moving_max_s:
+        if self.state is LineState.READY and moving_s > self._moving_max_s:
             return diagnostics.not_stopping(moving_s)
-        if self._problem is None and self._disc_monitor.are_others:
+        if self.state is LineState.READY and self._problem is None and self._disc_monitor.are_others:
             return diagnostics.other_discs(self._discs)
         return super().problem
 
@@ -119,9 +119,9 @@ class ArcosDriver(Session[PoseStamper]):
     def line_opened(self, run_s: float) -> None:
         """Start the handshake on a line that has just been opened."""
         self.line_closed()
+        self._odometry_gaps.begin()
         self._run_s = self._called_s = self._packet_s = run_s
-        self._state = LineState.HANDSHAKE
-        self._problem = None
+        self._state, self._problem = LineState.HANDSHAKE, None
         self._is_ending = False
         self._refused_until_s = -math.inf
         self.heard.clear()

@@ -83,6 +83,7 @@ class DenningDriver(Session[PoseStamper]):
     def line_opened(self, run_s: float) -> None:
         """Start the handshake on a line that has just been opened: HELLO, then PATTERN."""
         self.line_closed()
+        self._odometry_gaps.begin()
         self._run_s = self._last_frame_s = run_s
         self._flush_first = True
         self.heard.clear()

@@ -128,7 +128,7 @@ class RflexDriver(Session[Measurements]):
     def problem(self) -> str | None:
         """What is wrong, in one line; None if nothing is."""
         halting_s = self._brake.halting_s(self._run_s)
-        if self._state is LineState.READY and halting_s > _HALTING_MAX_S:
+        if self.state is LineState.READY and halting_s > _HALTING_MAX_S:
             return diagnostics.not_stopping(halting_s)
         return super().problem
 
@@ -145,6 +145,7 @@ class RflexDriver(Session[Measurements]):
     def line_opened(self, run_s: float) -> None:
         """Stop the base and request reports, on a line that has just been opened."""
         self.line_closed()
+        self._odometry_gaps.begin()
         self._run_s = run_s
         self.heard.clear()
         self._begin(LineState.HANDSHAKE, None)

@@ -164,6 +164,15 @@ def test_a_goal_beside_a_canyon_is_outside_only_if_something_is_between(
     assert (response is not None) is leaves
 
 
+def test_a_canyon_that_need_not_be_left_chooses_no_side() -> None:
+    other = Canyon(9, (2.2, 1.3, 1.4, 1.3), 0.5 * math.pi, 0.3, 0.97)
+    sides = [
+        leave_canyon(seen(2.0, 0.7, canyons=canyons), (2.6, 2.6), NO_DETOUR, 0.381, BLIND)[1].side
+        for canyons in ((CANYON, other), (other,))
+    ]
+    assert sides == [1, 1], "round the end of the other one's mouth"
+
+
 NARROW = Canyon(4, (1.0, 0.5, 1.0, -0.5), 0.0, 6.0, 0.97)
 
 
@@ -186,6 +195,14 @@ def test_a_narrow_canyon_is_left_by_its_middle_line_although_its_exit_is_heard_a
     heading, detour = leaving(0.8, 0.0, ends, (), detour)
     assert abs(heading) == pytest.approx(math.pi), "its body is still inside"
     assert leaving(0.3, 0.0, ends, (), detour)[1].leaving is None
+
+
+@pytest.mark.parametrize(("side_m", "leaves"), [(0.5, True), (9.0, False)])
+def test_a_narrow_canyon_is_left_no_further_once_the_goal_beside_it_is_free(side_m: float, *, leaves: bool) -> None:
+    side = np.column_stack([np.linspace(1.0, 7.0, 61), np.full(61, side_m)])
+    detour = replace(NO_DETOUR, leaving=NARROW)
+    response, after = leave_canyon(seen(3.0, 0.0, side, (NARROW,)), (3.0, 2.6), detour, 0.381, BLIND)
+    assert (response is not None, after.leaving is not None) == (leaves, leaves)
 
 
 def test_a_wide_canyon_is_left_along_its_side() -> None:

@@ -12,12 +12,17 @@ import serial
 
 from config.errors import FAILED, WRONG_CALL
 from config.robot import LinkConfig
-from drivers.serial_port import OPENING_ERRORS, explain, open_port, opening_error
+from drivers.serial_port import OPENING_ERRORS, explain, is_missing, open_port, opening_error
 from tests.drivers.pty_pair import PtyPair
 
 
 def config_of(path: Path) -> LinkConfig:
     return LinkConfig(port=str(path))
+
+
+def test_a_port_of_which_nothing_can_be_known_is_not_missing(tmp_path: Path) -> None:
+    assert is_missing(config_of(tmp_path / "none"))
+    assert not is_missing(config_of(tmp_path / ("n" * 300)))
 
 
 def test_an_opened_port_never_blocks_and_is_locked(pty: PtyPair) -> None:

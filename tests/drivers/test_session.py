@@ -67,6 +67,21 @@ def test_a_robot_that_is_switched_off_or_well_again_has_no_rare_odometry() -> No
     assert looks(OdometryGaps(0.4), [0.0, 1.0, 2.0], 6.0)[-1] is None
 
 
+def test_samples_that_follow_each_other_between_gaps_do_not_make_the_line_flap() -> None:
+    problems = looks(OdometryGaps(0.4), [0.9 * k + s for k in range(20) for s in (0.0, 0.3)], 17.0)
+    first = next(k for k, problem in enumerate(problems) if problem is not None)
+    assert first <= 61
+    assert None not in problems[first:]
+
+
+def test_gaps_are_found_where_the_line_may_be_silent_for_two_cycles_only() -> None:
+    gaps = OdometryGaps(0.1)
+    assert looks(gaps, [0.2 * k for k in range(20)], 4.0)[-1] is not None
+    gaps.begin()
+    assert gaps.problem(4.0) is None
+    assert set(looks(OdometryGaps(0.1), [0.06 * k for k in range(100)], 6.0)) == {None}
+
+
 def test_a_program_that_is_late_itself_accuses_no_robot() -> None:
     assert set(looks(OdometryGaps(0.4), [0.1 * k for k in range(200)], 20.0, step_s=0.6)) == {None}
 

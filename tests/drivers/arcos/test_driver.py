@@ -222,14 +222,23 @@ def test_a_robot_that_sends_but_does_not_receive_is_down(harness: Harness) -> No
     assert harness.state() is LineState.READY
 
 
-@pytest.mark.parametrize("period_s", [0.6, 1.0])
-def test_sips_that_come_too_rarely_leave_the_line_down_with_one_problem(harness: Harness, period_s: float) -> None:
+@pytest.mark.parametrize(("period_s", "speed"), [(0.6, 0), (1.0, 0), (1.0, 300)])
+def test_sips_that_come_too_rarely_leave_the_line_down_with_one_problem(
+    harness: Harness, period_s: float, speed: int
+) -> None:
+    """That the base does not stop is not said of a line that is down."""
+    problems = set[str | None]()
+
+    def look() -> None:
+        harness.controller.speed = speed
+        problems.add(harness.driver.problem)
+
     harness.sip_period_s = period_s
     harness.open()
-    harness.run(12.0)
+    harness.run(12.0, look)
     harness.states.clear()
-    problems = set[str | None]()
-    harness.run(20.0, lambda: problems.add(harness.driver.problem))
+    problems.clear()
+    harness.run(20.0, look)
     assert (harness.states, problems) == ([LineState.DOWN], {RARE.format(0.5, 0.25)})
     harness.sip_period_s = 0.1
     harness.run(3.0)
