@@ -24,6 +24,8 @@ class UserError(Exception):
     """
 
     exit_code: int = FAILED
+    is_of_file: bool = True
+    """Whether it may be about what a file says; False for what the machine lacks."""
 
     def __init__(self, text: str, exit_code: int | None = None) -> None:
         super().__init__(text)
@@ -37,6 +39,6 @@ def naming_file(file: str | None) -> Iterator[None]:
     try:
         yield
     except UserError as error:
-        if file is None or file in str(error):
-            raise
-        raise UserError(f"{file}: {error}", error.exit_code) from error
+        if file is not None and error.is_of_file and not str(error).startswith(f"{file}:"):
+            error.args = (f"{file}: {error}",)
+        raise

@@ -23,6 +23,12 @@ class DriverError(UserError):
     exit_code = WRONG_CALL
 
 
+class DriverPackageError(DriverError):
+    """The driver that the robot file names is known, and its package cannot be imported here."""
+
+    is_of_file = False
+
+
 class LineState(Enum):
     """The state of the connection with the robot."""
 

@@ -22,7 +22,7 @@ from config.plugins import PluginError, load_plugin, plugged
 from config.robot import CalibrationConfig, DriverConfig
 from drivers.calibrated_driver import CalibratedDriver
 from drivers.capabilities import CAPABILITIES
-from drivers.driver import DriverError
+from drivers.driver import DriverError, DriverPackageError
 from drivers.firing_pattern import firing_pattern
 from drivers.latched_ranges import FreshDriver
 from drivers.serial_port import OpenPort
@@ -219,7 +219,7 @@ def _family(name: str) -> DriverFamily:
     try:
         return cast("DriverFamily", load_plugin(entry))
     except PluginError as error:
-        raise DriverError(f'robot.driver = "{name}": {error}') from error
+        raise DriverPackageError(f'robot.driver = "{name}": {error}') from error
 
 
 def _with_errors(world: WorldConfig, errors: CalibrationConfig) -> WorldConfig:

@@ -6,10 +6,11 @@ import errno
 
 import pytest
 
-from config.errors import FAILED, WRONG_CALL, UserError
+from config.errors import FAILED, WRONG_CALL, UserError, naming_file
 from config.files import ConfigError, TomlSyntaxError
 from config.layers import PathError
 from config.robot import LinkConfig
+from drivers.driver import DriverError, DriverPackageError
 from drivers.emulator.port_link import EmulatorError
 from drivers.firing_pattern import FiringError
 from drivers.serial_port import LinkError, opening_error
@@ -23,6 +24,21 @@ def test_an_error_exits_with_its_class_code_or_with_its_own() -> None:
     assert UserError("a", WRONG_CALL).exit_code == WRONG_CALL
     assert RingLogError("a", FAILED).exit_code == FAILED
     assert UserError.exit_code == FAILED
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (FiringError("ring.firing: of 9"), "a.toml: ring.firing: of 9"),
+        (ConfigError("a.toml: line 3"), "a.toml: line 3"),
+        (DriverError("not as in a.toml"), "a.toml: not as in a.toml"),
+        (DriverPackageError("no rclpy"), "no rclpy"),
+    ],
+)
+def test_the_file_is_named_once_and_not_for_what_the_machine_lacks(error: UserError, said: str) -> None:
+    with pytest.raises(type(error)) as caught, naming_file("a.toml"):
+        raise error
+    assert (type(caught.value), str(caught.value)) == (type(error), said)
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
         )
     settings = load_any(config, sets)
     if isinstance(settings, Settings):
-        with naming_file(config):
+        with naming_file(f"--set over {config}" if sets else config):
             refuse_undrivable(settings)
             refuse_blind_ways(settings)
             check_places(settings.mission, settings.places)

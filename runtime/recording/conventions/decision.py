@@ -73,10 +73,12 @@ class Conventions:
         return self.columns is None and is_plain
 
     def is_same(self, other: Conventions) -> bool:
-        """Return whether both convert alike, up to the width of a noisy band of silence and the time of a cycle."""
+        """Return whether both convert alike, up to the widths of noise, of silence or repeats, and a cycle's time."""
         one, two = self.silence, other.silence
         is_alike = one.option == two.option and one.nan_is_silence == two.nan_is_silence
-        rest, others = ((of.not_fired, of.units, of.angles, of.cycle_s is None) for of in (self, other))
+        rest, others = (
+            (of.not_fired, of.units, of.angles, of.cycle_s is None, of.same_m > 0.0) for of in (self, other)
+        )
         return is_alike and rest == others
 
     def converted(self, firing: Firing) -> Firing:

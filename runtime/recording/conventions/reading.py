@@ -134,6 +134,8 @@ def _decided(seen: list[Firing], path: Path, robot: RobotConfig, options: RingLo
 
 
 def _found_words(path: Path, found: Conventions) -> str:
+    if not found.said:  # of what options leave open: noise on what is repeated
+        return f"{path}: later rows are in the form's own conventions, or repeat values with noise"
     what = "; ".join(words for words, _ in found.said)
     return f"{path}: {what}. To settle it: {'; '.join(option for _, option in found.said)}"
 

@@ -1,7 +1,8 @@
 """Whether the rows of a ring log repeat the last value of each sensor until it fires again.
 
 A row with more numbers than sensors fire at once is no single firing: either all sensors fired in the time of a row,
-or most numbers are old. Old ones are equal to the bit, and a sensor cannot change more often than it fires.
+or most numbers are old. Old ones are equal to the bit, or but for noise of one last digit, and a sensor cannot change
+more often than it fires.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class Repeats(NamedTuple):
     @property
     def words(self) -> str:
         """What was found."""
-        noise = f", give or take {self.same:.2g}" if self.same else ""
+        noise = f", give or take {self.same:.2g} in the file's unit" if self.same else ""
         return (
             f"each value is repeated{noise}, for {self.rows:g} rows mostly, until its sensor fires again: only "
             "changes are readings"

@@ -200,8 +200,10 @@ def run(
         recording.on_summary(summary)
     summary |= {} if recording.summary_row is None else {"recording": recording.summary_row}
     summary["log"] = {"lost": plan.log_status.lost, "last_error": plan.log_status.last_error}
-    _print_summary(summary, outputs.units)  # first: the disk may be full
-    _write_json(json, summary)
+    try:
+        _print_summary(summary, outputs.units)  # first: the disk may be full
+    finally:  # the output may be a closed pipe
+        _write_json(json, summary)
     restart.if_requested()
     if summary["mode"] == "FAULT":
         raise UserError(summary["stop_reasons"][-1], FAILED)

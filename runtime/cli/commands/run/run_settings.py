@@ -63,8 +63,11 @@ class SettingsFiles:
 
     @property
     def file(self) -> str | None:
-        """The file that says what the robot is; None if it is the default."""
-        return self.robot or self.config
+        """What says what the robot is, a file or --set over it; None if it is the default, or with a goal over it."""
+        file = self.robot or self.config
+        if file is None or self.goal is not None:
+            return None
+        return f"--set over {file}" if self.sets else file
 
     def read(self) -> Settings:
         """Return the settings as the files are now, on the port that they name.

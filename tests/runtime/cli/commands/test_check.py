@@ -90,6 +90,14 @@ def test_what_only_all_values_together_make_wrong_is_said_of_a_file(
         assert capsys.readouterr().err.startswith(f"echolocate: {words[-1]}: ring.firing: preset ")
 
 
+@pytest.mark.parametrize("words", [("check", "denning"), ("run", "--headless", "--robot", "denning")])
+def test_a_good_file_is_not_blamed_for_what_is_set_over_it(
+    words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:  # fmt: skip
+    assert run_command([*words, "--set", "ring.count=25"]) == WRONG_CALL
+    assert capsys.readouterr().err.startswith("echolocate: --set over denning: ring.firing: preset ")
+
+
 @pytest.mark.parametrize("name", ["drive.csv", "runs/drive.mcap"])
 def test_data_of_a_run_are_no_configuration(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     """A ring log was "no such run", and by its path an invalid key in line 1."""

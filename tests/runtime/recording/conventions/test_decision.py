@@ -32,5 +32,11 @@ def test_a_robot_that_drives_as_far_backward_as_forward_leaves_its_headings_to_t
     assert decide(table, drive.settings, AUTO).is_plain
 
 
+def test_noise_on_what_is_repeated_is_another_convention_and_its_width_is_not() -> None:
+    one = Conventions(cycle_s=0.4, same_m=1e-4)
+    assert one.is_same(Conventions(cycle_s=0.5, same_m=2e-4))
+    assert not one.is_same(Conventions(cycle_s=0.4))
+
+
 def test_the_forms_own_conventions_change_nothing() -> None:
     assert Conventions().is_plain

@@ -38,6 +38,7 @@ from tests.runtime.recording.conventions.tables import (
     written,
 )
 
+NO_LAG: Final = replace(AUTO, echo_lag="0")
 DRUM_M = 0.06
 """How far a drum may lie from where the clean table has it."""
 
@@ -134,12 +135,12 @@ def test_a_table_of_which_all_is_said_gives_its_drive(seed: int, tmp_path: Path)
     check_right(list(open_ring_log(path, drive.settings, right_options(case.how))), drive, case.how)
 
 
-def said_of(how: Convention, robot: str, path: Path) -> str:
-    """Return what is said of a table that is converted right; a lag is not looked for."""
+def said_of(how: Convention, robot: str, path: Path, options: RingLogOptions = NO_LAG) -> str:
+    """Return what is said of a table that is converted right; a lag is looked for only if the options say so."""
     drive = make_drive(12, robot, "room", "specular")
     written(drive, how, np.random.default_rng(12), path)
     said: list[str] = []
-    check_right(list(open_ring_log(path, drive.settings, replace(AUTO, echo_lag="0"), said.append)), drive, how)
+    check_right(list(open_ring_log(path, drive.settings, options, said.append)), drive, how)
     return " ".join(said)
 
 
@@ -169,7 +170,9 @@ def test_headings_may_count_from_anywhere(heading: str, tmp_path: Path) -> None:
 
 
 def test_times_in_nanoseconds_are_not_taken_for_microseconds(tmp_path: Path) -> None:
-    assert "--time-unit ns" in said_of(Convention(time="ns"), "p3dx", tmp_path / "table.csv")
+    said = said_of(Convention(time="ns"), "p3dx", tmp_path / "table.csv", AUTO)
+    assert "--time-unit ns" in said
+    assert "lag" not in said, "its ranges do not"
 
 
 @pytest.mark.parametrize(

@@ -46,6 +46,7 @@ def test_noise_of_the_last_digit_does_not_make_last_values_fresh(robot: str) -> 
     noisy = replace(clean, ranges=clean.ranges + 1e-4 * rng.integers(-1, 2, clean.ranges.shape))
     assert found(noisy).rows == repeats(clean)
     assert 2e-4 < found(noisy).same < 3e-4
+    assert "in the file's unit" in found(noisy).words
     assert noise_of_repeats(np.round(clean.ranges, 4)) == 0.0
     kept, held = RepeatFilter(clean.ranges.shape[1], 1e3), RepeatFilter(clean.ranges.shape[1], 1e3, found(noisy).same)
     rows = [Firing(t, Pose(0.0, 0.0, 0.0), 0.0, row) for t, row in zip(clean.t, clean.ranges, strict=True)]

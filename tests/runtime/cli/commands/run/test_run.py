@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from config.errors import FAILED, WRONG_CALL
 from drivers.link import Link
 from runtime.cli.app import run_command
+from runtime.cli.commands.run import run
 from runtime.cli.commands.run.run import EmulatorOptions
 from runtime.cli.commands.run.run_settings import SettingsFiles
 from runtime.support.file_lock import file_lock
@@ -75,6 +78,22 @@ def test_a_port_in_use(tmp_path: Path, sent: bytearray, capfd: pytest.CaptureFix
         assert stranger.path in line
         assert "in use" in line
         assert not sent
+
+
+def test_the_summary_is_in_its_file_though_the_output_is_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def whole_run(*_: object) -> tuple[dict[str, object], SimpleNamespace]:
+        return {"mode": "READY"}, SimpleNamespace(on_summary=lambda _: None, summary_row=None)
+
+    def print_summary(*_: object) -> None:
+        raise SystemExit(1)  # as rich does at a closed pipe
+
+    monkeypatch.setattr(run, "_whole_run", whole_run)
+    monkeypatch.setattr(run, "_print_summary", print_summary)
+    with contextlib.suppress(SystemExit):
+        run_command(["run", "--headless", "--no-record", "--json", str(tmp_path / "summary.json")])
+    assert json.loads((tmp_path / "summary.json").read_bytes())["mode"] == "READY"
 
 
 @pytest.mark.promise("P13")
