@@ -84,7 +84,7 @@ BUILT: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
     "silence as maximum": {"kind": "reported_silence", "range_m": math.inf},
 })  # fmt: skip
 """Faults that a robot is built with: they are there from the start."""
-CLOCK, EXCHANGED = "clock", "exchanged"
+CLOCK, OF_TWO = "clock", ("exchanged", "but one")
 """Kinds with these words change nothing on a robot whose packets carry no stamps, and on one with one sensor."""
 AHEAD_DEG: Final = 60.0
 MOVED_M: Final = 0.5
@@ -245,11 +245,9 @@ def make_lie(kind: str, settings: Settings, begin_s: float) -> Fault:
     axes = [abs(math.degrees(math.remainder(mount.angle_rad, math.tau))) for mount in settings.ring.mounts]
     if values.get("sensors") == AHEAD:
         values["sensors"] = [i for i, angle_deg in enumerate(axes) if angle_deg <= AHEAD_DEG]
-    elif values.get("sensors") == ONE:
-        of = settings.ring.sensor_of  # one on a servo has a number for each of its bearings
-        values["sensors"] = [i for i, sensor in enumerate(of) if sensor == of[int(np.argmin(axes))]]
-    elif values.get("sensors") == ALL_BUT_ONE:
-        values["sensors"] = [i for i in range(len(axes)) if i != int(np.argmin(axes))]
+    elif values.get("sensors") in {ONE, ALL_BUT_ONE}:
+        of, is_one = settings.ring.sensor_of, values["sensors"] == ONE  # one on a servo has a number for each bearing
+        values["sensors"] = [i for i, sensor in enumerate(of) if (sensor == of[int(np.argmin(axes))]) is is_one]
     adapter: TypeAdapter[Fault] = TypeAdapter(Fault)
     return adapter.validate_python(values | {"at_s": begin_s, "duration_s": 1e4})
 
@@ -347,7 +345,7 @@ def trials(
         stamped, has_two = settings.robot.driver != "arcos", settings.ring.sensor_count > 1
         for room, seed, moment in product(rooms, seeds, range(moments)):
             for kind in kinds:
-                if (stamped or CLOCK not in kind) and (has_two or EXCHANGED not in kind):
+                if (stamped or CLOCK not in kind) and (has_two or not kind.endswith(OF_TWO)):
                     yield robot, room, kind, seed, moment
 
 

