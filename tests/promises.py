@@ -72,7 +72,7 @@ LIMITS: Sequence[str] = (
     "An object that appears nearer than the way that the robot drives until the ring next looks there, and then "
     "brakes: at .3 m/s an object set .1 m ahead of the rim is hit by every robot that drives straight at it, "
     "since it is there after .33 s.",
-    "Something that was not recognised from elsewhere and that no beam meets, or that returns no echo: glass at a "
+    "Something that is no recognised model and that no beam meets, or that returns no echo: glass at a "
     "slant, cloth, what is above or below the beams, or the end of a thin wall or a leg between two beams. Beams "
     "that overlap at a distance leave gaps near a ring: those of the Denning within half a metre.",
     "A smooth wall whose normal lies in a blind side of the ring: a robot that only looks ahead hears nothing of it "

@@ -19,8 +19,8 @@ from drivers.messages import Floats, Pose
 from perception.detected_object import DetectedObject
 
 NEAR_M: Final = 0.5
-"""A foot that is farther from the ring than this is left to the echoes: the robot is nearer before it could touch it,
-and so hardly any drive depends on what is recognised (of 1,200 cycles in the paper's hall, none)."""
+"""A foot that is farther from the ring than this is left to the echoes: the rim of a `p3at` is .17 m outside its
+ring, and from .3 m/s it stops in .15 m, .16 m clear. With .8 m drives in the paper's hall depend on the method."""
 HEARD_M: Final = 0.05
 """An echo that is nearer to a foot than this stands for it: a third of the clearance that the arbiter keeps."""
 
@@ -43,10 +43,15 @@ def with_unheard_feet(
     ring_m : float
         Distance of the farthest sensor from the robot's centre, m.
     """
-    here, by_name = (pose.x, pose.y), {model.name: model for model in models}
-    known = (one for one in objects if one.probability is not None and one.model in by_name)
-    feet = (foot_of(one, by_name[one.model], pose) for one in known)
-    near = [foot for foot in feet if math.dist(foot, here) < ring_m + NEAR_M]
+    here, by_name, near_m = (pose.x, pose.y), {model.name: model for model in models}, ring_m + NEAR_M
+    feet = (
+        foot_of(one, by_name[one.model], pose)
+        for one in objects
+        if one.probability is not None
+        and one.model in by_name
+        and math.dist((one.x, one.y), here) < near_m + by_name[one.model].reach_m
+    )
+    near = [foot for foot in feet if math.dist(foot, here) < near_m]
     unheard = [foot for foot in near if not (np.hypot(*(echoes - foot).T) < HEARD_M).any()]
     return np.concatenate([echoes, unheard]) if unheard else echoes
 

@@ -81,7 +81,7 @@ def compare_runs(
         inputs = found.recorded.inputs
         first_run_s = inputs.run_s if first_run_s is None else first_run_s
         at_s = inputs.run_s - first_run_s
-        changed = step(other, inputs, settings, _ignore, _budget_of(found.recorded))
+        changed = step(other, inputs, settings, _ignore, within_quanta_per_cycle)
         comparison.cycles += 1
         _note_stop(comparison.other, changed, at_s)
         if found.replayed is None:
@@ -114,16 +114,6 @@ def run_under(recording: Recording, settings: Settings) -> tuple[RunOutcome, Cyc
         _note_stop(outcome, record, inputs.run_s - first_run_s)
     _sum_up(outcome, state, recording.world)
     return outcome, cycle_stats
-
-
-def _budget_of(recorded: CycleRecord) -> Callable[[int], bool]:
-    """Return what refinement is left of a cycle: as many quanta as the run had time for, else all that are due.
-
-    So settings that change nothing change no command, although these depend on what is recognised near the robot.
-    """
-    if recorded.refinement == "budget":
-        return lambda done: done < recorded.quanta
-    return within_quanta_per_cycle
 
 
 def _ignore(command: Command) -> None:

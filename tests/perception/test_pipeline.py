@@ -9,6 +9,7 @@ import pytest
 
 from config.load import load_model, load_world, with_known_room
 from drivers.messages import Firing, Pose
+from perception.detected_object import DetectedObject
 from perception.edits import PlaceRobot
 from perception.pipeline import Perception
 from perception.snapshot import bounds_of
@@ -24,6 +25,17 @@ def test_a_firing_of_another_ring_is_refused(count: int) -> None:
     perception = Perception(chosen.ring, chosen.models, chosen.perception)
     with pytest.raises(ValueError, match=f"a firing of {count} ranges, but the ring has 24 sensors"):
         perception.observe(Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, np.full(count, 2.0)))
+
+
+def test_a_recognised_object_is_an_obstacle_where_no_echo_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen, here = settings(), Pose(0.0, 0.0, 0.0)
+    perception = Perception(chosen.ring, chosen.models, chosen.perception)
+    assert len(perception.surroundings(0.0, 0.0, here, 1.0)[1]) == 0
+    drum = DetectedObject("drum", 1.0, 0.0, 0.0, 0.003, 40, 0.999, 0.999)
+    monkeypatch.setattr(Perception, "near_objects", lambda _: (drum,))
+    foot = [[1.0 - load_model("drum").reach_m, 0.0]]
+    np.testing.assert_allclose(perception.surroundings(0.0, 0.0, here, 1.0)[1], foot, atol=1e-9)
+    np.testing.assert_allclose(perception.steady_obstacles(0.0, 1.0, here), foot, atol=1e-9)
 
 
 @pytest.mark.compiled
