@@ -90,7 +90,7 @@ def blocked_by(percept: Percept, v: float, body_radius_m: float) -> str | None:
     if nearest is None:
         return None
     _, distance_m, bearing_deg, number = nearest
-    what = "a no-go line" if number >= len(percept.obstacles) - percept.no_go else "an echo"
+    what = "a no-go line" if number >= len(percept.obstacles) - percept.no_go else "an obstacle"
     side, other = ("left" if bearing_deg >= 0.0 else "right"), ("back" if v > 0.0 else "forward")
     return (
         f"blocked by {what} {max(0.0, distance_m - body_radius_m):.2f} m from the robot's edge, "

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import os
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
@@ -12,7 +14,7 @@ from drivers.base_model import stop_s
 from drivers.driver import LineState, RobotDriver
 from drivers.link import Link
 from drivers.messages import Flags
-from drivers.serial_port import LinkError, is_missing, open_port
+from drivers.serial_port import LinkError, is_missing, open_port, opening_error
 from runtime.cycle.line_messages import ROBOT_LINE, LineMessages
 from runtime.cycle.step import STANDSTILL
 
@@ -69,19 +71,28 @@ class Connection(NamedTuple):
                 raise UserError(reason or text, FAILED)
             await asyncio.sleep(POLL_S)
 
-    @property
-    def is_missing(self) -> bool:
-        """Whether there is no such port, so that `connect` fails at once."""
-        return self.link.opener is open_port and is_missing(self.link.config)
+    def refuse_missing(self) -> None:
+        """Raise what `connect` would raise if there is no such port; nothing is opened.
+
+        Raises
+        ------
+        LinkError
+            There is none.
+        """
+        config = self.link.config
+        if self.link.opener is open_port and is_missing(config):
+            raise self._worded(opening_error(config, FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))))
 
     async def _open(self) -> None:
         try:
             await self.link.open_once()
         except LinkError as error:
-            text = self.line_messages.problem(LineState.CLOSED, str(error))
-            if text in (None, str(error)):
-                raise
-            raise LinkError(text, FAILED) from error
+            raise self._worded(error) from error
+
+    def _worded(self, error: LinkError) -> LinkError:
+        """Return the error in the words for what is at the other end of the line."""
+        text = self.line_messages.problem(LineState.CLOSED, str(error))
+        return error if text in (None, str(error)) else LinkError(text, FAILED)
 
     async def shut_down(self) -> bool:
         """Halt the base and end the session; return whether the base confirmed that it stopped."""

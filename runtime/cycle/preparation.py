@@ -48,9 +48,8 @@ class Preparation(Protocol):
 class Connects(Protocol):
     """Connects to the robot; see `runtime.cycle.connection`."""
 
-    @property
-    def is_missing(self) -> bool:
-        """Whether there is no such port, so that `connect` fails at once."""
+    def refuse_missing(self) -> None:
+        """Raise a UserError if there is no such port, so that `connect` would fail at once; connect to nothing."""
 
     async def connect(self, is_stopping: Callable[[], bool]) -> None:
         """Return when the robot is ready, or the run is ending; raise a UserError if it does not answer."""
@@ -106,12 +105,10 @@ class RunningPreparation:
             Whether the run is ending.
         """
         if self._preparation is not None:
-            is_connected = await self._prepare_ring(self._preparation, settings, connection, is_stopping)
+            await self._prepare_ring(self._preparation, settings, connection, is_stopping)
             if is_stopping():
                 return
             self._task = asyncio.create_task(self._prepare(self._preparation, settings), name="preparation")
-            if is_connected:
-                return
         try:
             await connection.connect(is_stopping)
         except BaseException:  # nothing else would end it
@@ -148,15 +145,13 @@ class RunningPreparation:
 
     async def _prepare_ring(
         self, preparation: Preparation, settings: Settings, connection: Connects, is_stopping: Callable[[], bool]
-    ) -> bool:
-        """Wait until the ring can be heard, and say now and then how far that is; return whether it is connected."""
-        ring, is_connected = asyncio.ensure_future(preparation.ring(settings)), False
+    ) -> None:
+        """Wait until the ring can be heard, and say now and then how far that is."""
+        ring = asyncio.ensure_future(preparation.ring(settings))
         begin_s = said_s = asyncio.get_running_loop().time()
         try:
             while not is_stopping() and not (await asyncio.wait([ring], timeout=POLL_S))[0]:
-                if connection.is_missing and not is_connected:
-                    await connection.connect(is_stopping)  # says why that fails
-                    is_connected = True
+                connection.refuse_missing()
                 now_s = asyncio.get_running_loop().time()
                 if now_s - said_s >= PROGRESS_PERIOD_S:
                     said_s, so_far = now_s, f"waiting for {now_s - begin_s:.0f} s"
@@ -168,7 +163,6 @@ class RunningPreparation:
                 ring.result()
         finally:
             ring.cancel()
-        return is_connected
 
     async def _prepare(self, preparation: Preparation, settings: Settings) -> None:
         await preparation(settings)

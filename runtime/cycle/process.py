@@ -298,17 +298,17 @@ class RobotProcess:
     def _gather(self, run_s: float, host_s: float, echo_age_s: float | None = None) -> Inputs:
         """Return what the robot sent and the operator requested since the last cycle."""
         if self._arm_when_ready and self._driver.state is LineState.READY and self._state.mode.mode in NEVER_ARMED:
-            self._arm_when_ready = False
             self.request(Request.ARM)
-        request = self._request if self._is_request_valid() else None
-        self._request = None
+        request, self._request = self._request if self._is_request_valid() else None, None
         edits, self._edits = tuple(self._edits[:EDITS_PER_CYCLE]), self._edits[EDITS_PER_CYCLE:]
         overrun = self._budget.flood(run_s) or self._scheduler.overrun
         operator = OperatorInput(request, self._drive_inputs.take(), edits)
-        return gather_inputs(
+        inputs = gather_inputs(
             self._driver, run_s, operator, echo_age_s=echo_age_s, overrun=overrun, fault=self.health.fault(),
             host_s=host_s, preparing=self._preparation.progress(run_s), line_messages=self._line_messages,
         )  # fmt: skip
+        self._arm_when_ready &= request is None or inputs.line is not LineState.READY  # a lost line drops the request
+        return inputs
 
     def _step(self, inputs: Inputs, now: ClockSample, mark: Callable[[Phase], None]) -> CycleRecord:
         """Run the pure step with this process's line and clock."""
@@ -344,7 +344,7 @@ class RobotProcess:
         """Halt before anything else, then enter FAULT, which is never left, and log the error."""
         self._halt()
         is_known, what = isinstance(error, UserError), f"the cycle failed ({describe_exception(error)})"
-        reason = str(error) if is_known else f"{what}, likely through a program error: see the log, then restart it"
+        reason = str(error) if is_known else f"{what}, likely a program error: see the log, then restart the program"
         self._state.mode = self._state.mode.enter(Mode.FAULT, self._clock(), reason)
         self._mode_log.entered(self._state, self._clock())
         if not is_known:

@@ -57,7 +57,7 @@ def blind_notes(settings: Settings) -> list[str]:
     sides = blind_sides_deg(settings)
     if not sides:
         return []
-    heard_deg = 360 - sum(end - begin + 1 for begin, end in sides)
+    heard_deg = max(0, 360 - sum(end - begin + 1 for begin, end in sides))
     arbiter, body = settings.behaviors.arbiter, settings.body
     path_deg = math.degrees(path_half_angle_rad(body, arbiter.clearance_m))
     where = " and ".join(f"{begin}° to {end}°" for begin, end in sides)

@@ -168,10 +168,10 @@ def test_what_blocks_an_operator_is_named_with_its_place(heading: float) -> None
     """Of three points within reach only those on the side to which the robot is driven count."""
     seen = at(heading, (0.7, 0.0), (0.3, 0.3), (-0.4, -0.4))
     assert blocked_by(seen, 0.2, 0.4) == (
-        "blocked by an echo 0.02 m from the robot's edge, 45° left of its front: turn away, or drive back"
+        "blocked by an obstacle 0.02 m from the robot's edge, 45° left of its front: turn away, or drive back"
     )
     assert blocked_by(seen, -0.2, 0.4) == (
-        "blocked by an echo 0.17 m from the robot's edge, 135° right of its front: turn away, or drive forward"
+        "blocked by an obstacle 0.17 m from the robot's edge, 135° right of its front: turn away, or drive forward"
     )
     assert (blocked_by(replace(seen, no_go=1), -0.2, 0.4) or "").startswith("blocked by a no-go line 0.17 m")
     assert blocked_by(at(heading, (-0.4, 0.1)), 0.2, 0.4) is None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import pickle
 import subprocess
 import threading
@@ -36,8 +37,8 @@ if TYPE_CHECKING:
 
 EVERY_CYCLES: Final = 5
 """Draw every fifth cycle: 4 Hz at 20 Hz."""
-QUANTILES_EVERY_CYCLES: Final = 20
-"""Cycles from one computation of their quantiles to the next: after an hour each takes 2 ms of the interpreter."""
+QUANTILES_PERIOD_S: Final = 1.0
+"""Time from one computation of their quantiles to the next, s: after an hour each takes 2 ms of the interpreter."""
 TRAIL: Final = 400
 PICTURE: Final = "runtime.cli.terminal"
 """The module that draws, run as a program."""
@@ -88,6 +89,7 @@ class View:
         self._quantiles: tuple[Quantiles, Quantiles] | None = None
         """Of all cycles up to `_counted`: how long they took, and how late they began."""
         self._counted = 0
+        self._recount_cycles = math.ceil(QUANTILES_PERIOD_S * settings.cycle.rate_hz)
         self._wake = threading.Event()
         self._done = False
         self._thread = Worker("view", self._pass_on)
@@ -167,10 +169,14 @@ class View:
                 pass
 
     def _completed(self, snapshot: Snapshot) -> Snapshot:
-        """Add what would take a cycle too long: the quantiles of all cycles, anew after `QUANTILES_EVERY_CYCLES`."""
-        stats = self._stats
+        """Add what would take a cycle too long: the quantiles of all cycles, anew now and then.
+
+        That is after `QUANTILES_PERIOD_S`, and for each picture while few are counted, and for the last one.
+        """
+        stats, recount_cycles = self._stats, self._recount_cycles
         if stats is not None:
-            if self._quantiles is None or stats.cycles >= self._counted + QUANTILES_EVERY_CYCLES:
+            is_due = stats.cycles < recount_cycles or stats.cycles >= self._counted + recount_cycles
+            if self._quantiles is None or is_due or self._done:
                 self._counted, self._quantiles = stats.cycles, (stats.cycle_us(), stats.lag_us())
             snapshot = replace(snapshot, cycle_us=self._quantiles[0], lag_us=self._quantiles[1])
         return replace(snapshot, is_paused=self.is_paused())
@@ -189,9 +195,11 @@ class View:
         snapshot = None
         try:
             pickle.dump(self._scale, picture.stdin)
-            while not self._done:
+            is_last = False
+            while not is_last:
                 self._wake.wait()
                 self._wake.clear()
+                is_last = self._done
                 while self._lines:
                     pickle.dump(self._lines.popleft(), picture.stdin)
                 newest, self._slot = self._slot, None

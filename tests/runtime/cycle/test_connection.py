@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, MutableMapping
+from pathlib import Path
 from typing import Any, NoReturn
 
 import pytest
 import structlog
 
 from config.errors import FAILED, UserError
+from config.load import load_settings
 from drivers.base_model import stop_s
 from drivers.emulator.faults import Deaf, Fault, Garbage, Mute
+from drivers.link import Link
 from drivers.messages import Flags, Twist
-from runtime.cycle.connection import ANSWER_TIMEOUT_S, CONNECT_MAX_S, POLL_S
+from drivers.registry import make_driver
+from drivers.serial_port import LinkError
+from runtime.cycle.connection import ANSWER_TIMEOUT_S, CONNECT_MAX_S, POLL_S, Connection
 from runtime.cycle.process import Observers, RobotProcess
 from tests.runtime.virtual_time import STEP_S, MemoryLink, in_virtual_time
 
@@ -78,6 +83,20 @@ def test_a_port_that_sends_noise(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_line_that_is_lost_before_the_handshake(monkeypatch: pytest.MonkeyPatch) -> None:
     silent = Mute(kind="mute", at_s=0.0, duration_s=LONG_S)
     assert refusal(monkeypatch, silent, disturb=MemoryLink.pull) == "pulled out"
+
+
+async def test_a_port_that_is_missing_is_refused_as_its_opening_would_be(tmp_path: Path) -> None:
+    settings = load_settings("hallway", [f"link.port={tmp_path / 'none'}"])
+    link = Link(settings.link, lambda: None, lambda _data: None, lambda _reason: None)
+    connection = Connection(link, make_driver(settings), lambda: None, lambda: 0.0, settings.body)
+    with pytest.raises(LinkError, match="no such port") as refused:
+        connection.refuse_missing()
+    with pytest.raises(LinkError) as opened:
+        await connection.connect(lambda: False)
+    assert (str(refused.value), refused.value.exit_code) == (str(opened.value), opened.value.exit_code)
+    (tmp_path / "none").touch()
+    connection.refuse_missing()
+    assert not link.is_open
 
 
 @pytest.mark.parametrize(("robot_file", "farewell"), [("denning", ""), ("p3dx", "fafb06023b0100033b"), ("b21r", "")])

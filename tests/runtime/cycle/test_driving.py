@@ -87,7 +87,7 @@ def test_teleoperation_is_limited_by_echoes_and_by_the_validity_of_a_velocity() 
     for avoid in ("true", "false"):
         script = driving(f"behaviors.teleoperation.avoid={avoid}", "behaviors.arbiter.clearance_m=3.0")
         assert script.request_drive(FORWARD).command == near(0.0, 0.1)
-        assert hold_reason(script).startswith("blocked by an echo 3.00 m from the robot's edge, 0° left of its front")
+        assert hold_reason(script).startswith("blocked by an obstacle 3.00 m from the robot's edge, 0° left of")
         assert [r.schema for r in script.state.vectors] == [
             "teleoperation", *(["avoid_static_obstacle"] if avoid == "true" else []), "sum",
         ]  # fmt: skip

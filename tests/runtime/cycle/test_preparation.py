@@ -62,12 +62,15 @@ class Port:
     """A port to which a robot is plugged in, or that is missing."""
 
     def __init__(self, *, is_missing: bool = False) -> None:
-        self.is_missing = is_missing
+        self._is_missing = is_missing
+
+    def refuse_missing(self) -> None:
+        if self._is_missing:
+            raise UserError("no such port")
 
     async def connect(self, is_stopping: Callable[[], bool]) -> None:
         assert not is_stopping()
-        if self.is_missing:
-            raise UserError("no such port")
+        assert not self._is_missing
 
 
 class Run:

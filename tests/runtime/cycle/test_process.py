@@ -12,7 +12,7 @@ import structlog
 from behaviors.move_to_goal import Goal
 from drivers.denning.codec import Decoder
 from drivers.denning.frames import Echo
-from drivers.driver import RobotDriver
+from drivers.driver import LineState, RobotDriver
 from drivers.messages import Flags
 from perception.edits import Edit, PlaceModel
 from runtime.cycle.drive_requests import Legs
@@ -174,6 +174,32 @@ def test_the_first_cycle_arms_the_robot(monkeypatch: pytest.MonkeyPatch) -> None
     assert modes[0] is Mode.READY
     period_s = 1.0 / settings.cycle.rate_hz
     assert begins_s[modes.index(Mode.DRIVE)] - begins_s[0] <= ARMING_MIN_S + period_s + 1e-6
+
+
+def test_a_line_that_the_first_cycle_finds_lost_is_armed_once_it_is_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The driver finds it in its tick, after a look at its state that found it ready."""
+    lines = list[LineState]()
+    with in_virtual_time(monkeypatch) as (loop, settings, _robot, links):
+
+        def on_cycle(record: CycleRecord, *_: State | CycleStats | RobotDriver) -> None:
+            lines.append(record.inputs.line)
+
+        def lose(run_s: float) -> None:
+            monkeypatch.setattr(process._driver, "tick", tick)
+            links[0].pull()
+            links[0].plug()
+            tick(run_s)
+
+        def before_cycles(_realtime: object) -> tuple[str, ...]:
+            monkeypatch.setattr(process._driver, "tick", lose)
+            return ()
+
+        process = RobotProcess(settings, Log().log, Observers(on_cycle), loop.time)
+        tick = process._driver.tick
+        monkeypatch.setattr("runtime.cycle.process.apply_realtime", before_cycles)
+        summary = loop.run_until_complete(process.run(arm=True, seconds=2.0))
+    assert lines[0] is not LineState.READY
+    assert summary["mode"] == "DRIVE"
 
 
 def test_a_halt_before_the_first_cycle_counts_more_than_arming(monkeypatch: pytest.MonkeyPatch) -> None:

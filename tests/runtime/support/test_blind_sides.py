@@ -44,6 +44,11 @@ def test_four_sensors_in_front_are_blind_behind_and_do_not_back() -> None:
     assert "does not find itself before it has turned or driven, and it recognises an object once" in stand
 
 
+def test_a_ring_that_hears_nothing_hears_no_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("runtime.support.blind_sides.blind_sides_deg", lambda _settings: [(-180, 180)])
+    assert "at one place it hears 0° of 360°" in blind_notes(robot(0.0))[-1]
+
+
 def test_a_ring_that_hears_more_than_half_of_a_turn_finds_itself_at_a_stand() -> None:
     notes = blind_notes(robot(-90.0, -70.0, -50.0, -30.0, -10.0, 10.0, 30.0, 50.0, 70.0, 90.0))
     assert notes
