@@ -7,6 +7,8 @@ import re
 import subprocess
 import sys
 import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -128,10 +130,12 @@ def test_a_file_is_made_once_and_each_process_has_its_own_copy(tmp_path: Path) -
 
     def make(path: Path) -> None:
         made.append(path)
+        time.sleep(0.05)  # meanwhile the others ask for it
         path.write_text("a recording")
 
     processes: list[Any] = [Folders(tmp_path / f"process{number}") for number in range(3)]
-    copies = [made_once(folders, "run", make) for folders in processes]
+    with ThreadPoolExecutor(3) as pool:
+        copies = list(pool.map(lambda folders: made_once(folders, "run", make), processes))
     assert copies == [tmp_path / f"process{number}" / "run" / "hall.mcap" for number in range(3)]
     assert [path.read_text() for path in copies] == 3 * ["a recording"]
     assert len(made) == 1

@@ -45,8 +45,10 @@ def fits_unseen_wall(
 ) -> bool:
     """Return whether a range changes as that of a wall along the path does, on a side where no sensor sees one.
 
-    A ring that only looks ahead has no sensor square to the path that would hear how far away the wall is. Its beams
-    graze it all the same, and their ranges stay.
+    No beam there comes so near to the wall's normal, about 20°, that it would hear how far away the wall is. So it is
+    with a ring that only looks ahead, and now and then with one all round whose axes are more than 40° and a beam's
+    width apart. Its beams graze the wall all the same, and their ranges stay. The price: a ring that only looks
+    ahead by its file, and is mounted turned by 90°, is not found beside walls.
 
     Parameters
     ----------

@@ -54,7 +54,10 @@ def test_a_quantum_does_so_much_and_a_search_ends() -> None:
     assert done.count(True) == 1
     assert local["piece_count"] == 1
     assert local["pieces"]["echoes"][0, 0] > 0.8 * quantum.SEARCH_READINGS_MIN
+    assert local["heard"][0] > 0.0
+    local["passed"] = 1.0
     quantum.do_quantum(rooms, every, HALF, RADII)
     assert local["phase"] == quantum.CAPTURE
     for name in ("cells", "pieces", "points", "chains"):
         assert not local[name].tobytes().strip(b"\0"), name
+    assert local["heard"][0] == local["passed"][0] == 0.0
