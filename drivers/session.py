@@ -11,66 +11,14 @@ from typing import Final, Generic, TypeVar
 from drivers.driver import LineState, Received
 from drivers.heard_bytes import HeardBytes
 from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
+from drivers.odometry_gaps import OdometryGaps
 from drivers.stamper import Stamper
 
-GAPS_MIN, LATEST = 2, 3
-"""So many gaps among the latest times between two samples are no restart and no replugged cable."""
 FIRINGS_MAX: Final = 1024
 """Firings kept if they are not taken; the oldest are dropped. At 20 firings a second this is almost a minute."""
 
 
 S = TypeVar("S", bound=Stamper)
-
-RARE: Final = (
-    "samples of odometry come more than {:g} s apart, after which the line counts as down; the robot sends them too "
-    "rarely, or its line delivers them late: set the robot to send them at least every {:g} s, or raise "
-    "link.silence_max_s, and look for what delays the line"
-)
-
-
-class OdometryGaps:
-    """Detects odometry that comes too rarely: each sample would raise the line, and the wait for the next lower it.
-
-    A restart or a loose cable makes one gap, and samples follow each other after it. Times are those of the looks, so
-    that a gap is one in which a look found nothing for too long.
-
-    Parameters
-    ----------
-    longest_s : float
-        Longest gap after which the line is not down, s.
-    """
-
-    def __init__(self, longest_s: float) -> None:
-        self._longest_s = longest_s
-        self._looked_s = -math.inf
-        self.begin()
-
-    def begin(self) -> None:
-        """Forget all samples, as for a line that has just been opened."""
-        self._sample_s = -math.inf
-        self._are_gaps: deque[bool] = deque(maxlen=LATEST)
-        """Which of the latest times between samples are gaps."""
-        self._gap_s, self._is_rare = 0.0, False
-        """The last gap, s; whether there were too many, until there is none."""
-
-    def look(self, run_s: float, *, came: bool) -> None:
-        """Take whether a sample came since the last look; after a long time without a look, gaps say nothing."""
-        before_s, self._looked_s = self._looked_s, run_s
-        if run_s - before_s > self._longest_s:
-            self.begin()
-        elif came:
-            is_gap = self._longest_s < before_s - self._sample_s < math.inf
-            self._gap_s = run_s - self._sample_s if is_gap else self._gap_s
-            self._sample_s = run_s
-            self._are_gaps.append(is_gap)
-            gaps = sum(self._are_gaps)
-            self._is_rare = gaps > 0 and (self._is_rare or gaps >= GAPS_MIN)
-
-    def problem(self, run_s: float) -> str | None:
-        """Return what is wrong where the last samples came too rarely and the next is not long overdue."""
-        if not self._is_rare or run_s - self._sample_s > 2.0 * self._gap_s:
-            return None
-        return RARE.format(self._longest_s, 0.5 * self._longest_s)
 
 
 class Session(ABC, Generic[S]):
@@ -163,6 +111,17 @@ class Session(ABC, Generic[S]):
         if not (math.isfinite(twist.v) and math.isfinite(twist.w)):
             raise ValueError(f"cannot drive at {twist}: a velocity must be finite; something divided by zero")
         self._drive = twist
+
+    def line_opened(self, run_s: float) -> None:
+        """Forget what came on an earlier line; a driver begins its handshake after that."""
+        self.line_closed()
+        self._odometry_gaps.begin()
+        self.heard.clear()
+        self._run_s = run_s
+
+    @abstractmethod
+    def line_closed(self) -> None:
+        """Forget commands in progress, but those that must reach the robot on the next line."""
 
     def take_received(self) -> Received:
         """Return what was received since the last call, and remove it."""

@@ -118,13 +118,11 @@ class ArcosDriver(Session[PoseStamper]):
 
     def line_opened(self, run_s: float) -> None:
         """Start the handshake on a line that has just been opened."""
-        self.line_closed()
-        self._odometry_gaps.begin()
-        self._run_s = self._called_s = self._packet_s = run_s
+        super().line_opened(run_s)
+        self._called_s = self._packet_s = run_s
         self._state, self._problem = LineState.HANDSHAKE, None
         self._is_ending = False
         self._refused_until_s = -math.inf
-        self.heard.clear()
         if self._has_session:  # the robot has kept the speed
             self._handshake.resume(run_s)
         else:

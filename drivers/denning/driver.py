@@ -82,11 +82,9 @@ class DenningDriver(Session[PoseStamper]):
 
     def line_opened(self, run_s: float) -> None:
         """Start the handshake on a line that has just been opened: HELLO, then PATTERN."""
-        self.line_closed()
-        self._odometry_gaps.begin()
-        self._run_s = self._last_frame_s = run_s
+        super().line_opened(run_s)
+        self._last_frame_s = run_s
         self._flush_first = True
-        self.heard.clear()
         self._drive_acks = CommandAckMonitor()
         self._start_handshake()
 

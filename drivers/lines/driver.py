@@ -57,9 +57,8 @@ class LineDriver(Session[LineStamper]):
 
     def line_opened(self, run_s: float) -> None:
         """Set the pattern, and let a base that is latched stand, at once."""
-        self.line_closed()
-        self._odometry_gaps.begin()
-        self._run_s = self._heard_s = run_s
+        super().line_opened(run_s)
+        self._heard_s = run_s
         self._state, self._problem = LineState.HANDSHAKE, None
         self._asks_still, self._asks_pattern = self._is_latched, True
 

@@ -144,10 +144,7 @@ class RflexDriver(Session[Measurements]):
 
     def line_opened(self, run_s: float) -> None:
         """Stop the base and request reports, on a line that has just been opened."""
-        self.line_closed()
-        self._odometry_gaps.begin()
-        self._run_s = run_s
-        self.heard.clear()
+        super().line_opened(run_s)
         self._begin(LineState.HANDSHAKE, None)
 
     def line_closed(self) -> None:

@@ -70,9 +70,7 @@ class View:
 
     def __init__(self, settings: Settings, console: Console, units: Units) -> None:
         self._console = console
-        size_m = {
-            m.name: m.arc_radius_m or max(float(np.hypot(x, y)) for x, y in m.vertices_m) for m in settings.models
-        }
+        size_m = {m.name: m.reach_m for m in settings.models}
         radii_m = {m.name: m.arc_radius_m or CORNERED_M for m in settings.models}
         self._scale = Scale(units, settings.ring.range_max_m, size_m, radii_m)
         self._ranges = np.full(len(settings.ring.mounts), np.nan)

@@ -15,7 +15,6 @@ from drivers.arcos.handshake import STOP
 from drivers.driver import LineState
 from drivers.firing_pattern import FiringError
 from drivers.messages import Flags, Twist
-from drivers.session import RARE
 from tests.drivers.arcos.harness import OVER_TCP, P3DX_FILE, Controller, Harness, numbers
 from tests.drivers.arcos.vectors import P3DX
 
@@ -220,29 +219,6 @@ def test_a_robot_that_sends_but_does_not_receive_is_down(harness: Harness) -> No
     harness.controller.deaf = False
     harness.run(4.0)
     assert harness.state() is LineState.READY
-
-
-@pytest.mark.parametrize(("period_s", "speed"), [(0.6, 0), (1.0, 0), (1.0, 300)])
-def test_sips_that_come_too_rarely_leave_the_line_down_with_one_problem(
-    harness: Harness, period_s: float, speed: int
-) -> None:
-    """That the base does not stop is not said of a line that is down."""
-    problems = set[str | None]()
-
-    def look() -> None:
-        harness.controller.speed = speed
-        problems.add(harness.driver.problem)
-
-    harness.sip_period_s = period_s
-    harness.open()
-    harness.run(12.0, look)
-    harness.states.clear()
-    problems.clear()
-    harness.run(20.0, look)
-    assert (harness.states, problems) == ([LineState.DOWN], {RARE.format(0.5, 0.25)})
-    harness.sip_period_s = 0.1
-    harness.run(3.0)
-    assert harness.state() is LineState.READY, harness.driver.problem
 
 
 def test_a_reset_controller_begins_a_new_session() -> None:

@@ -9,6 +9,7 @@ from drivers.arcos.commands import Command, CommandNumber
 from drivers.arcos.frames import Packet, RobotName, SyncEcho
 from drivers.driver import LineState
 from drivers.messages import Twist
+from drivers.odometry_gaps import RARE
 from tests.drivers.arcos.harness import OVER_TCP, P3DX_FILE, Controller, Harness, numbers
 
 N = CommandNumber
@@ -225,3 +226,24 @@ def test_a_valid_packet_before_noise_is_not_forgotten() -> None:
         harness.run(0.1)
         harness.to_driver(b"\x80\x01")
     assert "although valid frames of a robot came before" in (harness.driver.problem or "")
+
+
+@pytest.mark.parametrize(("period_s", "speed"), [(0.6, 0), (1.0, 0), (1.0, 300)])
+def test_sips_that_come_too_rarely_leave_the_line_down_with_one_problem(period_s: float, speed: int) -> None:
+    """That the base does not stop is not said of a line that is down."""
+    harness, problems = Harness(), set[str | None]()
+
+    def look() -> None:
+        harness.controller.speed = speed
+        problems.add(harness.driver.problem)
+
+    harness.sip_period_s = period_s
+    harness.open()
+    harness.run(12.0, look)
+    harness.states.clear()
+    problems.clear()
+    harness.run(20.0, look)
+    assert (harness.states, problems) == ([LineState.DOWN], {RARE.format(0.5, 0.25)})
+    harness.sip_period_s = 0.1
+    harness.run(3.0)
+    assert harness.state() is LineState.READY, harness.driver.problem

@@ -245,23 +245,6 @@ def test_angles_in_no_unit_of_ours_are_refused(robot: str, factor: float, tmp_pa
     assert re.search("theta is neither in radians nor in degrees|theta turns at|do not follow theta", text), text
 
 
-@pytest.mark.parametrize(
-    ("order", "named"),
-    [
-        ((0, 1, 12, *range(3, 12), 2, *range(13, 16)), "r02 is sensor 12, r12 is sensor 2 of the robot file"),
-        ((*range(7, -1, -1), *range(8, 16)), "r00 is sensor 7, r01 is sensor 6, r02 is sensor 5"),
-    ],
-)
-def test_exchanged_columns_are_refused_with_their_sensors(order: tuple[int, ...], named: str, tmp_path: Path) -> None:
-    drive, how = make_drive(12, "p3dx", "room", "specular"), Convention(order=order)
-    path = written(drive, how, np.random.default_rng(12), tmp_path / "table.csv")
-    with pytest.raises(RingLogError, match=named) as refused:
-        list(open_ring_log(path, drive.settings))
-    assert "or say --sensor-order file if they are right" in str(refused.value)
-    taken = list(open_ring_log(path, drive.settings, replace(AUTO, sensor_order="file", echo_lag="0")))
-    assert len(taken) == len(drive.ranges)
-
-
 def test_a_robot_that_always_drives_backward_is_believed(tmp_path: Path) -> None:
     drive = make_drive(12, "p3dx", "room", "specular")
     back = replace(drive, pose=drive.pose[::-1].copy(), ranges=drive.ranges[::-1].copy())

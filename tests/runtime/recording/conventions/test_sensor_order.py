@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from config.load import load_settings
 from runtime.recording.conventions.headings import SURE, Angles, echo_scores, mirror_image
+from runtime.recording.conventions.options import AUTO
+from runtime.recording.conventions.reading import open_ring_log
 from runtime.recording.conventions.sensor_order import find_exchange, find_shift, mirrored_columns
 from runtime.recording.conventions.table import Table
+from runtime.recording.ring_log import RingLogError
 from tests.recordings import recording
-from tests.runtime.recording.conventions.tables import make_drive
+from tests.runtime.recording.conventions.tables import Convention, make_drive, written
 
 RING = load_settings("hallway", robot="p3dx").ring
 
@@ -115,3 +121,20 @@ def test_real_recordings_are_in_their_order(name: str) -> None:
         0.0 if name == "corridor" else 0.5 * SURE
     )  # without a pose, echoes say little; a log is refused above this
     assert found is None or found.surely <= limit
+
+
+@pytest.mark.parametrize(
+    ("order", "named"),
+    [
+        ((0, 1, 12, *range(3, 12), 2, *range(13, 16)), "r02 is sensor 12, r12 is sensor 2 of the robot file"),
+        ((*range(7, -1, -1), *range(8, 16)), "r00 is sensor 7, r01 is sensor 6, r02 is sensor 5"),
+    ],
+)
+def test_exchanged_columns_are_refused_with_their_sensors(order: tuple[int, ...], named: str, tmp_path: Path) -> None:
+    drive, how = make_drive(12, "p3dx", "room", "specular"), Convention(order=order)
+    path = written(drive, how, np.random.default_rng(12), tmp_path / "table.csv")
+    with pytest.raises(RingLogError, match=named) as refused:
+        list(open_ring_log(path, drive.settings))
+    assert "or say --sensor-order file if they are right" in str(refused.value)
+    taken = list(open_ring_log(path, drive.settings, replace(AUTO, sensor_order="file", echo_lag="0")))
+    assert len(taken) == len(drive.ranges)
