@@ -272,6 +272,19 @@ def complexity(function: ast.AST) -> int:
     return total
 
 
+def test_a_number_of_perception_has_its_name_alone() -> None:
+    """A reader who meets a name of another module must not have to ask which of two values it is."""
+    values = dict[str, set[str]]()
+    for path, source in MODULES.items():
+        for node in ast.parse(source, path).body if path.startswith("perception/") else ():
+            if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.value is not None:
+                value = ast.unparse(node.value)
+                if ast.unparse(node.annotation) == "Final" and any(letter.isdigit() for letter in value):
+                    values.setdefault(node.target.id, set()).add(value)
+    assert len(values) > 500
+    assert {name: sorted(of) for name, of in values.items() if len(of) > 1} == {}
+
+
 def test_functions_are_simple() -> None:
     """Of the arguments of a function ruff takes care (PLR0913)."""
     complex_ones = {

@@ -21,7 +21,7 @@ from perception.detected_object import DetectedObject
 NEAR_M: Final = 0.5
 """A foot that is farther from the ring than this is left to the echoes: the rim of a `p3at` is .17 m outside its
 ring, and from .3 m/s it stops in .15 m, .16 m clear. With .8 m drives in the paper's hall depend on the method."""
-HEARD_M: Final = 0.05
+FOOT_HEARD_M: Final = 0.05
 """An echo that is nearer to a foot than this stands for it: a third of the clearance that the arbiter keeps."""
 
 
@@ -52,7 +52,7 @@ def with_unheard_feet(
         and math.dist((one.x, one.y), here) < near_m + by_name[one.model].reach_m
     )
     near = [foot for foot in feet if math.dist(foot, here) < near_m]
-    unheard = [foot for foot in near if not (np.hypot(*(echoes - foot).T) < HEARD_M).any()]
+    unheard = [foot for foot in near if not (np.hypot(*(echoes - foot).T) < FOOT_HEARD_M).any()]
     return np.concatenate([echoes, unheard]) if unheard else echoes
 
 

@@ -45,7 +45,7 @@ NOISE_MAX: Final = 25.0
 """Greatest estimate of the noise, as a factor on the nominal variance."""
 FIT_MEMORY: Final = 0.03
 """Share of one expected echo in `Estimate.fit_share`."""
-UNHEARD: Final = -1.0
+NO_RANGE: Final = -1.0
 """In place of the range of a landmark that was not heard, m."""
 EDGE_RAD: Final = math.radians(0.2)
 """Standard deviation of where a beam ends."""
@@ -273,7 +273,7 @@ def update_with_range(
         est.fit_share += FIT_MEMORY * ((1.0 if best != NO_LANDMARK else 0.0) - est.fit_share)
     is_missed = first != NO_LANDMARK and first != best and r > nearest + PASSED_M and nearest < sonar.range_max
     if is_missed and not is_landmark_hidden(e, first, x, y):
-        update_with_edge(e, covariance, first, mx, my, axis, half_angle, UNHEARD)
+        update_with_edge(e, covariance, first, mx, my, axis, half_angle, NO_RANGE)
     elif best == NO_LANDMARK and is_expected and abs(r - nearest) <= NEAR_M:
         est.landmarks[first].failures += 1
     if best == NO_LANDMARK or is_ambiguous:

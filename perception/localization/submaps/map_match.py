@@ -38,7 +38,7 @@ UNKNOWN_ANSWER: Final = 0.03
 MATCH_TEMPER: Final = 0.1
 """Weight of a reading: those of a few metres of way share the errors of their maps. With 0.1, matches of maps of
 real drives deviate as they say (the median of their squared errors over their covariance is 1 to 2 for 3 degrees)."""
-STEP: Final = np.array([0.08, 0.08, 0.03])
+POSE_STEP: Final = np.array([0.08, 0.08, 0.03])
 """Differences of place (m) and direction (rad) by which the likelihood's slope and curvature are taken."""
 STEP_MOVE_MAX_M: Final = 0.15
 """The most by which one step shifts a match."""
@@ -234,15 +234,15 @@ def best_match(
         here, slope = log_density(at), np.zeros(3)
         plus, minus, curvature = np.zeros(3), np.zeros(3), np.zeros((3, 3))
         for i in range(3):
-            plus[i], minus[i] = log_density(at + STEP * _AXES[i]), log_density(at - STEP * _AXES[i])
-            slope[i] = (plus[i] - minus[i]) / (2.0 * STEP[i])
-            curvature[i, i] = (plus[i] + minus[i] - 2.0 * here) / STEP[i] ** 2
+            plus[i], minus[i] = log_density(at + POSE_STEP * _AXES[i]), log_density(at - POSE_STEP * _AXES[i])
+            slope[i] = (plus[i] - minus[i]) / (2.0 * POSE_STEP[i])
+            curvature[i, i] = (plus[i] + minus[i] - 2.0 * here) / POSE_STEP[i] ** 2
             yield None
         for i, j in ((1, 0), (2, 0), (2, 1)):
-            both = STEP * (_AXES[i] + _AXES[j])
+            both = POSE_STEP * (_AXES[i] + _AXES[j])
             mixed = log_density(at + both) + log_density(at - both)
             mixed += 2.0 * here - plus[i] - minus[i] - plus[j] - minus[j]
-            curvature[i, j] = curvature[j, i] = mixed / (2.0 * STEP[i] * STEP[j])
+            curvature[i, j] = curvature[j, i] = mixed / (2.0 * POSE_STEP[i] * POSE_STEP[j])
             yield None
         values, axes = np.linalg.eigh(-curvature)
         values = np.maximum(values, INFORMATION_MIN)

@@ -94,7 +94,7 @@ NODE_STRENGTH: Final = 2.5
 """It has two whole echoes from each of two directions, or as much, and a little more. Drives: with 2.4 polylines
 explain 0.2 % more and 1.2 instead of 0.8 % of them are false, in other buildings 8.1 instead of 7.3 %; with 2.2
 0.2 % more again, and false by 1.9 and 9.6 %."""
-ECHO_NAT: Final = 1.5
+POINT_ECHO_NAT: Final = 1.5
 """Log odds of a point of a polyline by an echo; a pass has those of a surface like the map's pieces. Other buildings
 where everything echoes: 6.9 to 3.1 % of the polylines are false, and as much is explained; 1.0 leaves 2.1 %, but
 explains 0.4 % less of the drives, 1.25 0.1 % less."""

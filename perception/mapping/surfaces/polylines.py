@@ -11,12 +11,12 @@ from perception.mapping.surfaces.parameters import (
     CELL_M,
     CELLS,
     DIRECTIONS,
-    ECHO_NAT,
     LINK_M,
     NODE_CELLS,
     NODE_M,
     NODE_STRENGTH,
     PIECE_KEPT_M,
+    POINT_ECHO_NAT,
 )
 from perception.mapping.surfaces.pieces import offset_of
 from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCounts, LocalMap, SurfaceCell
@@ -96,7 +96,7 @@ def is_agreed(counts: CellCounts, cell: SurfaceCell, nat: float) -> bool:
         hits = hits_around(counts, b, cell.i, cell.j, NODE_CELLS)
         strength += direction_strength(hits)
         passes += direction_strength(passes_of_heard(counts, b, cell.i, cell.j, hits))
-    return bool(strength >= NODE_STRENGTH and strength * ECHO_NAT + passes * nat > 0.0)
+    return bool(strength >= NODE_STRENGTH and strength * POINT_ECHO_NAT + passes * nat > 0.0)
 
 
 @kernel

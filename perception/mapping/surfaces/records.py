@@ -27,7 +27,7 @@ from perception.mapping.surfaces.parameters import (
 from perception.records import Record, Records
 
 WORDS: Final = SAMPLES // SHARES_A_WORD
-SHARES: Final = Bound(0, 2 ** (SHARES_A_WORD * SHARE_BITS) - 1)
+PACKED_SHARES: Final = Bound(0, 2 ** (SHARES_A_WORD * SHARE_BITS) - 1)
 """Of shares packed into a word; a further one would belong to no place on the arc."""
 Narrow = NDArray[np.int32]
 """Counts of all readings fit, and twice as many of them fit into the processor's caches."""
@@ -59,7 +59,7 @@ class KeptReading(Record):
     """10⁶ for silence."""
     submap: Count
     """Number of the map of the way in which it was heard."""
-    shares: Annotated[Ints, WORDS, SHARES]
+    shares: Annotated[Ints, WORDS, PACKED_SHARES]
     """Shares of the echo of the places on its arc, `SHARES_A_WORD` in each number."""
 
 
