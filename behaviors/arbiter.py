@@ -56,6 +56,8 @@ class Unseen(Stop):
 
     age_s: float
     """How long they have not, s; infinite if they never have."""
+    sensors: tuple[int, ...] = ()
+    """Those that should look there; empty if none does."""
 
 
 Decision: TypeAlias = Drive | Stop
@@ -123,7 +125,7 @@ def arbitrate(
     seen = seen_speed_m_s(percept, body, config.clearance_m, w)
     if seen == 0.0 and (unseen := _unseen_ways(percept, course, body, config)) is not None:
         remedy = "check the ring's cables and what covers it" if unseen.sensors else "mount sensors whose beams do"
-        return Unseen(f"{unseen.reason}; {remedy}, then re-arm", unseen.age_s)
+        return Unseen(f"{unseen.reason}; {remedy}, then re-arm", unseen.age_s, unseen.sensors)
     stoppable = stoppable_speed_m_s(percept, body, config.clearance_m, config.cautious_velocity_m_s)
     v = min(speed, body.speed_max_m_s, stoppable, seen)
     # Not `v > limit or …`: only this form also refuses NaN.

@@ -6,13 +6,17 @@ emulated robot too. Cause and action are not where they name hardware, and are r
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
+from behaviors.arbiter import Unseen
+from config.robot import RingConfig
 from drivers.driver import LineState
+from drivers.firing_pattern import firing_pattern
 
 HARDWARE: Final = re.compile(r"\b(cable|power|plug|plugged|unplugged|restart the robot|emergency switch)\b")
 """What the other end lacks if it is a program."""
@@ -21,6 +25,11 @@ EXCESS: Final = re.compile(r"\b(many|more|corrupt)\b")
 """What a program that is stopped or late does not cause."""
 
 PSEUDO_TERMINALS: Final = "/dev/pts/"
+
+FIRST_LOOK_PATTERNS: Final = 2.0
+"""How often the firing pattern may go round until the ring has looked ahead: each sensor fires once in a round, and
+its echo arrives during the next."""
+FIRST_LOOK: Final = "the ring has just begun to fire: the robot stands until all sensors have looked ahead"
 
 
 class LineMessages(Protocol):
@@ -109,3 +118,21 @@ def blind_reason(blind_s: float, line_problem: str | None, *, fires: bool) -> st
         f"the ring fires, but no sensor has given a usable range for {blind_s:.1f} s, as all are masked or "
         f"report faults: {likely}, then re-arm"
     )
+
+
+def unseen_reason(unseen: Unseen, driven_s: float, ring: RingConfig) -> str:
+    """Return why the robot stands that does not see its way; a ring that has just begun needs time, and no check.
+
+    Parameters
+    ----------
+    unseen
+        The arbiter's decision.
+    driven_s
+        Time since DRIVE was entered, s.
+    ring
+        The robot's.
+    """
+    is_new = unseen.sensors and math.isinf(unseen.age_s)
+    if is_new and driven_s <= FIRST_LOOK_PATTERNS * firing_pattern(ring).cycle_s:
+        return FIRST_LOOK
+    return unseen.reason

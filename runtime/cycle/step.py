@@ -48,7 +48,7 @@ from runtime.cycle.driving import commit, drive
 from runtime.cycle.echo_watch import EchoWatch
 from runtime.cycle.goal_drive import can_look_ahead, look_ahead
 from runtime.cycle.inputs import Inputs
-from runtime.cycle.line_messages import blind_reason
+from runtime.cycle.line_messages import blind_reason, unseen_reason
 from runtime.cycle.modes import ARMING_MAX_S, Mode, ModeState, advance
 from runtime.cycle.motion_monitor import MotionMonitor, Movement
 from runtime.cycle.stalled_drives import DriveMemory
@@ -359,7 +359,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
         driven_s = inputs.run_s - state.mode.entered_run_s
         if min(decision.age_s - age_max_s, driven_s) <= age_max_s:
             # It stands until the ring looks there: echoes were lost, or not every sensor has fired since the start.
-            reason, decision = decision.reason, Drive(STANDSTILL)
+            reason, decision = unseen_reason(decision, driven_s, settings.ring), Drive(STANDSTILL)
     if isinstance(decision, Drive):
         slow_reason = state.echo_watch.slow_reason(settings.ring.range_max_m)
         twist, slowed = limit_unheard(decision.twist, percept, unheard, settings, slow_reason)

@@ -17,6 +17,7 @@ from drivers.emulator.faults import Fault, Garbage, StuckSensor
 from drivers.firing_pattern import FiringError
 from drivers.messages import wrap_angle
 from runtime.cycle.inputs import Request
+from runtime.cycle.line_messages import FIRST_LOOK
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.long_hall import long_hall
@@ -111,6 +112,21 @@ def test_it_slows_down_stands_and_names_the_sensors(
     driven = run.robot.truth.pose.x - place
     assert driven < 0.5
     measured(f"{len(sensors)} sensors fail at 0.3 m/s: stands after {driven:.2f} m")
+
+
+@pytest.mark.parametrize(("sensors", "said"), [
+    ((), [FIRST_LOOK]),
+    ([0], [FIRST_LOOK, "the ring has not looked ahead yet: no usable range from sensor 0; check the ring's cables "
+           "and what covers it, then re-arm"]),
+], ids=["good", "sensor 0 is deaf"])  # fmt: skip
+def test_a_ring_that_has_just_begun_is_given_time_for_its_pattern(sensors: Sequence[int], said: list[str]) -> None:
+    run = WatchedRun(settings(), WALL_AHEAD, 0, failing(sensors, 0.0))
+    reasons = list[str]()
+    while run.run_s < 1.0:
+        run.cycle()
+        if (reason := run.state.hold_reason) is not None and reason not in reasons:
+            reasons.append(reason)
+    assert reasons == said
 
 
 def test_an_operator_is_held_in_front_of_the_unseen_and_may_drive_back() -> None:
