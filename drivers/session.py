@@ -28,6 +28,8 @@ class Session(ABC, Generic[S]):
     ----------
     heard
         The bytes of the line in place of the robot's frames.
+    is_other_robot
+        Whether the robot has said that it is another one than its file describes.
     """
 
     def __init__(self, stamper: S, silence_max_s: float = math.inf) -> None:
@@ -50,6 +52,7 @@ class Session(ABC, Generic[S]):
         self._noted = set[str]()
         """Messages of `_note_once` so far."""
         self.heard = HeardBytes()
+        self.is_other_robot = False
 
     @property
     def state(self) -> LineState:

@@ -294,6 +294,7 @@ class ArcosDriver(Session[PoseStamper]):
         if handshake.stage is Stage.CONFIG and handshake.name is not None:
             wrong = diagnostics.wrong_robot(handshake.name, self._config)
             if wrong is not None:
+                self.is_other_robot = True
                 self._refuse(wrong)
         elif handshake.stage is Stage.DONE and not self._is_set_up:
             self._set_up()

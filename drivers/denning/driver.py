@@ -294,6 +294,7 @@ class DenningDriver(Session[PoseStamper]):
         if wrong is None:
             wrong = diagnostics.cannot_listen(ident, self._listeners) or diagnostics.cannot_turn(ident, self._sweeps)
         if wrong is not None:
+            self.is_other_robot = True
             self._go_down(wrong)
             return
         self._ident = ident

@@ -19,10 +19,13 @@ from drivers.heard_bytes import HeardBytes
 from drivers.link import Link, LinkError
 from drivers.messages import Flags, Identity
 from drivers.registry import line_options, make_driver, other_robot
+from drivers.session import Session
 from runtime.cycle.connection import POLL_S, Connection
 
 ANSWER_MAX_S: Final = 3.0
 """Longest wait for a robot's first frame, s: as long as it takes to call a Pioneer at every speed of its line."""
+SOCKET_MAX_S: Final = 4.2
+"""Longest wait for first frames over a network, of all families, s: nothing is lost there, and it has no speeds."""
 AGAIN_MAX_S: Final = 3.0
 """Longest wait until a port that was just given up can be opened again, s: a server of one client is still busy."""
 READY_MAX_S: Final = 6.0
@@ -64,13 +67,16 @@ class _Answer(NamedTuple):
     """How many of its sensors have fired."""
     is_whole: bool = False
     """Whether all have."""
+    is_other: bool = False
+    """Whether the robot has said what it is, so that another file of its family may be its own."""
 
 
 async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
     """Return what answers on a port.
 
-    Robots of one driver and one speed are tried one after the other as long as something answers them. One of which
-    all sensors fire is the robot; some controllers do not name theirs, and the one of which most fire is chosen.
+    Robots of one driver and one speed are tried one after the other as long as something answers them and either
+    is ready or says that it is another robot; what answers one family is not asked by the next. One of which all
+    sensors fire is the robot; some controllers do not name theirs, and the one of which most fire is chosen.
 
     Parameters
     ----------
@@ -81,9 +87,11 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
     """
     said, best = dict[str, list[str]](), (0, Finding(None, ()))  # what was said as which robots
     strangers, tries = list[str](), itertools.count()
-    for _, family in itertools.groupby(sorted(robots.items(), key=_family), key=_family):
+    families = [list(ones) for _, ones in itertools.groupby(sorted(robots.items(), key=_family), key=_family)]
+    answer_max_s = min(ANSWER_MAX_S, SOCKET_MAX_S / len(families)) if "://" in port else ANSWER_MAX_S
+    for family in families:
         for name, config in family:
-            answer = await _try(port, config, again=next(tries) > 0)
+            answer = await _try(port, config, answer_max_s, again=next(tries) > 0)
             if answer.text is not None:
                 if best[1].robot is None or answer.fired > best[0]:
                     best = (answer.fired, Finding(name, (answer.text,)))
@@ -93,12 +101,12 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
                 strangers.append(answer.stranger)
             if answer.problem is not None:
                 said.setdefault(answer.problem, []).extend([name] if answer.has_answered else ())
-            if not answer.has_answered:
+            if not answer.has_answered or (answer.problem is not None and not answer.is_other):
                 break
         if best[1].robot is not None:
             return best[1]
-        if said and not answer.has_answered and answer.problem is not None:
-            break  # the port cannot be opened
+        if answer.has_answered or answer.problem is not None:
+            break  # it is of this family, or the port cannot be opened
     return Finding(None, _lines(said, strangers))
 
 
@@ -118,13 +126,15 @@ def _family(item: tuple[str, RobotConfig]) -> tuple[str, int]:
     return item[1].robot.driver, item[1].link.baud
 
 
-async def _try(port: str, config: RobotConfig, *, again: bool = False) -> _Answer:
+async def _try(port: str, config: RobotConfig, answer_max_s: float, *, again: bool = False) -> _Answer:
     """Return what the driver of one robot finds out; it is never released, so nothing moves.
 
     Parameters
     ----------
     port, config
         The port, and the robot.
+    answer_max_s
+        Longest wait for its first frame, s.
     again
         Whether the port was open just before.
     """
@@ -158,8 +168,9 @@ async def _try(port: str, config: RobotConfig, *, again: bool = False) -> _Answe
             send()
             has_answered = driver.counts.frames > 0
             if driver.state is LineState.DOWN and has_answered:
-                return _Answer(has_answered=True, problem=driver.problem)
-            if clock() - begin_s > (READY_MAX_S if has_answered else ANSWER_MAX_S):
+                is_other = isinstance(driver, Session) and driver.is_other_robot
+                return _Answer(has_answered=True, problem=driver.problem, is_other=is_other)
+            if clock() - begin_s > (READY_MAX_S if has_answered else answer_max_s):
                 stranger = heard.stranger or NO_FRAME if heard.total and not has_answered else None
                 return _Answer(has_answered, stranger=stranger)
             await asyncio.sleep(POLL_S)

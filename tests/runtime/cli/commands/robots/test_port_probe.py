@@ -26,7 +26,7 @@ async def test_of_robots_that_do_not_name_themselves_the_one_of_which_all_or_mos
     robots = {name: load_robot(name) for name in ("atrvjr", "b21r", "b21r-both", "denning", "magellan")}
     asked = list[str]()
 
-    async def answer(_port: str, config: RobotConfig, *, again: bool) -> port_probe._Answer:
+    async def answer(_port: str, config: RobotConfig, _answer_max_s: float, *, again: bool) -> port_probe._Answer:
         assert again == bool(asked)
         (name,) = (name for name, known in robots.items() if known is config)
         asked.append(name)
@@ -38,6 +38,42 @@ async def test_of_robots_that_do_not_name_themselves_the_one_of_which_all_or_mos
 
     monkeypatch.setattr(port_probe, "_try", answer)
     assert await port_probe.probe_port("/dev/ttyUSB0", robots) == port_probe.Finding(chosen, (chosen,))
+
+
+@pytest.mark.parametrize(
+    ("answers", "asked"),
+    [
+        ({}, ["amigo", "denning", "b21r"]),
+        ({"amigo": False}, ["amigo"]),
+        ({"amigo": True, "p3at": True, "p3dx": False}, ["amigo", "p3at", "p3dx"]),
+        ({"denning": True, "hobby8": False}, ["amigo", "denning", "hobby8"]),
+    ],
+    ids=["nothing", "a Pioneer that fails", "a p3dx that fails", "a hobby8 that fails"],
+)
+async def test_what_answers_one_family_is_asked_again_only_if_it_says_what_it_is(
+    answers: dict[str, bool], asked: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What answers a call is a robot of this family; another file of it helps only where it is refused as another."""
+    robots = {name: load_robot(name) for name in ("amigo", "b21r", "denning", "hobby8", "p3at", "p3dx")}
+    tried, waits_s = list[str](), set[float]()
+
+    async def answer(_port: str, config: RobotConfig, answer_max_s: float, *, again: bool) -> port_probe._Answer:
+        assert again == bool(tried)
+        (name,) = (name for name, known in robots.items() if known is config)
+        tried.append(name)
+        waits_s.add(answer_max_s)
+        if name not in answers:
+            return port_probe._Answer(has_answered=False)
+        return port_probe._Answer(has_answered=True, problem="wrong", is_other=answers[name])
+
+    monkeypatch.setattr(port_probe, "_try", answer)
+    said = (f"as {', '.join(answers)}: wrong" if answers else port_probe.NOTHING,)
+    assert await port_probe.probe_port("socket://localhost:1", robots) == port_probe.Finding(None, said)
+    assert tried == asked
+    assert waits_s == {port_probe.SOCKET_MAX_S / 3}, "the three families share the time"
+    tried.clear()
+    await port_probe.probe_port("/dev/ttyUSB0", robots)
+    assert waits_s == {port_probe.SOCKET_MAX_S / 3, port_probe.ANSWER_MAX_S}, "at each speed of a line"
 
 
 async def test_a_port_that_is_still_busy_with_the_robot_tried_before_is_opened_again(

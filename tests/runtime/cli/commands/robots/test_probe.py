@@ -14,6 +14,8 @@ import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from config.errors import DONE, FAILED
+from drivers.arcos.codec import encode
+from drivers.arcos.frames import RobotName
 from drivers.heard_bytes import HeardBytes
 from runtime.bridges import local_network
 from runtime.bridges.local_network import Announced
@@ -180,6 +182,15 @@ class OnlySync0(Peer):
         return data if data == bytes.fromhex("fafb03000000") else b""
 
 
+class NamesItself(Peer):
+    """A simulator of a p3dx that answers the SYNCs and nothing else."""
+
+    def answer(self, data: bytes) -> bytes:
+        if data == bytes.fromhex("fafb03020002"):
+            return encode(RobotName("sim", "Pioneer", "p3dx"))
+        return data if data in {bytes.fromhex("fafb03000000"), bytes.fromhex("fafb03010001")} else b""
+
+
 @pytest.mark.parametrize(
     ("peer", "robot", "said"),
     [
@@ -187,6 +198,8 @@ class OnlySync0(Peer):
         (Talker, "p3dx", "a device sends text, as '220 print server ready'"),
         (Mirror, "denning", "what this program sends comes back"),
         (OnlySync0, "p3dx", "as p3dx: the robot answers SYNC0 and not SYNC1"),
+        (OnlySync0, None, "as amigo: the robot answers SYNC0 and not SYNC1"),
+        (NamesItself, None, "as p3dx: the robot answers the SYNCs, but neither OPEN nor CONFIG"),
     ],
 )
 def test_a_device_that_is_no_robot_is_named_and_a_socket_has_no_speeds(
