@@ -29,7 +29,7 @@ PSEUDO_TERMINALS: Final = "/dev/pts/"
 FIRST_LOOK_PATTERNS: Final = 2.0
 """How often the firing pattern may go round until the ring has looked ahead: each sensor fires once in a round, and
 its echo arrives during the next."""
-FIRST_LOOK: Final = "the ring has just begun to fire: the robot stands until all sensors have looked ahead"
+FIRST_LOOK: Final = "the ring has only just started to fire: the robot stands until all sensors have looked ahead"
 
 
 class LineMessages(Protocol):
@@ -121,7 +121,7 @@ def blind_reason(blind_s: float, line_problem: str | None, *, fires: bool) -> st
 
 
 def unseen_reason(unseen: Unseen, driven_s: float, ring: RingConfig) -> str:
-    """Return why the robot stands that does not see its way; a ring that has just begun needs time, and no check.
+    """Return why the robot stands that does not see its way; one that has just started needs time, and no check.
 
     Parameters
     ----------

@@ -119,7 +119,7 @@ def test_it_slows_down_stands_and_names_the_sensors(
     ([0], [FIRST_LOOK, "the ring has not looked ahead yet: no usable range from sensor 0; check the ring's cables "
            "and what covers it, then re-arm"]),
 ], ids=["good", "sensor 0 is deaf"])  # fmt: skip
-def test_a_ring_that_has_just_begun_is_given_time_for_its_pattern(sensors: Sequence[int], said: list[str]) -> None:
+def test_a_ring_that_has_just_started_is_given_time_for_its_pattern(sensors: Sequence[int], said: list[str]) -> None:
     run = WatchedRun(settings(), WALL_AHEAD, 0, failing(sensors, 0.0))
     reasons = list[str]()
     while run.run_s < 1.0:
