@@ -6,15 +6,18 @@ import asyncio
 import contextlib
 import os
 import signal
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
 
 from config.errors import FAILED, WRONG_CALL, UserError
 from runtime.support.child_process import ECHOLOCATE, start_child
+from runtime.support.forked_child import ForkedChild, can_fork, fork
 from runtime.support.temp_folder import temp_folder
 from runtime.timing.run_clock import ScaledClock
 from runtime.timing.time_control import EmulatorTimeControl
+
+Child: TypeAlias = asyncio.subprocess.Process | ForkedChild
 
 READY_WORD: Final = "ready"
 """First word of the line that the emulator prints when it is ready."""
@@ -39,7 +42,11 @@ class EmulatorHandle(NamedTuple):
 
 @contextlib.asynccontextmanager
 async def start_emulator(
-    arguments: Sequence[str], clock: ScaledClock | None = None, *, compiled: bool = True
+    arguments: Sequence[str],
+    clock: ScaledClock | None = None,
+    *,
+    compiled: bool = True,
+    main: Callable[[], None] | None = None,
 ) -> AsyncIterator[EmulatorHandle]:
     """Run ``echolocate emulate`` as a child process while the context lasts, and yield its port and time control.
 
@@ -54,6 +61,8 @@ async def start_emulator(
         The run's clock, if it is needed before the emulator.
     compiled : bool
         Whether its kernels are to be compiled. Plain Python starts at once and costs a twentieth of a core.
+    main : callable, optional
+        The program `echolocate`: runs in a copy of this process, where one can be made, as that starts sooner.
 
     Raises
     ------
@@ -64,7 +73,11 @@ async def start_emulator(
         port = _folder(stack) / "robot"
         words = ["emulate", "--link", str(port), "--end-with-parent", "--control", *arguments]
         interpreted = {} if compiled else {"NUMBA_DISABLE_JIT": "1"}
-        process = await start_child(ECHOLOCATE, words, pipes=True, environment=interpreted)
+        process: Child
+        if main is not None and can_fork():
+            process = await fork(main, words, interpreted)
+        else:
+            process = await start_child(ECHOLOCATE, words, pipes=True, environment=interpreted)
         listener: asyncio.Task[None] | None = None
         try:
             await _wait_until_ready(process)
@@ -92,7 +105,7 @@ def _folder(stack: contextlib.ExitStack) -> Path:
         ) from error
 
 
-async def _listen(process: asyncio.subprocess.Process, control: EmulatorTimeControl) -> None:
+async def _listen(process: Child, control: EmulatorTimeControl) -> None:
     try:
         while process.stdout is not None and (line := await process.stdout.readline()):
             control.receive(line)
@@ -100,12 +113,12 @@ async def _listen(process: asyncio.subprocess.Process, control: EmulatorTimeCont
         control.emulator_ended()
 
 
-def _write(process: asyncio.subprocess.Process, line: bytes) -> None:
+def _write(process: Child, line: bytes) -> None:
     if process.stdin is not None and not process.stdin.is_closing():
         process.stdin.write(line)
 
 
-async def _wait_until_ready(process: asyncio.subprocess.Process) -> None:
+async def _wait_until_ready(process: Child) -> None:
     """Wait until the emulator says so; if it does not, kill it and raise a `UserError` with what it wrote."""
     out, err = process.stdout, process.stderr
     if out is None or err is None:
@@ -128,7 +141,7 @@ def _end_of(code: int) -> str:
     return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
 
-async def _end(process: asyncio.subprocess.Process) -> None:
+async def _end(process: Child) -> None:
     """End the emulator in order, or after `END_MAX_S` by force, and wait for that."""
     _signal(process, signal.SIGTERM)
     try:
@@ -138,7 +151,7 @@ async def _end(process: asyncio.subprocess.Process) -> None:
         await process.wait()
 
 
-def _signal(process: asyncio.subprocess.Process, number: signal.Signals) -> None:
+def _signal(process: Child, number: signal.Signals) -> None:
     """Send a signal without asyncio, whose own method may reap the child first and then fails."""
     if process.returncode is None:
         with contextlib.suppress(ProcessLookupError):

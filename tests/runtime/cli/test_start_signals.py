@@ -46,7 +46,7 @@ MOMENTS: Final = [
     ("import", 30, signal.SIGINT),
     ("import", 300, signal.SIGHUP),
     ("tempfile.mkdtemp", 1, signal.SIGTERM),
-    ("subprocess.Popen", 1, signal.SIGINT),
+    ("os.fork", 1, signal.SIGINT),
 ]
 
 

@@ -282,6 +282,7 @@ async def _whole_run(
     import contextlib
 
     from runtime import VERSION
+    from runtime.cli.__main__ import main
     from runtime.cli.start_signals import ending_the_start
     from runtime.simulation.emulator_process import start_emulator
     from runtime.support.kernel_cache import EMULATOR, is_compiled
@@ -293,7 +294,8 @@ async def _whole_run(
         running.enter_context(ending_the_start())  # until `signals` takes over
         emulator_start: asyncio.Task[EmulatorHandle] | None = None
         if isinstance(plan.clock, ScaledClock):  # first of all: it takes as long as what follows
-            starting = start_emulator(emulator_arguments, plan.clock, compiled=is_compiled(EMULATOR))
+            compiled = is_compiled(EMULATOR)
+            starting = start_emulator(emulator_arguments, plan.clock, compiled=compiled, main=main)
             emulator_start = asyncio.create_task(running.enter_async_context(starting), name="emulator")
             running.push_async_callback(_end_task, emulator_start)
         if settings.console.enabled:  # meanwhile: it reads certificates, for which it needs no interpreter
