@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import types
 from importlib.metadata import EntryPoint
@@ -84,3 +85,12 @@ def test_an_installed_driver_may_repeat_last_values(monkeypatch: pytest.MonkeyPa
     all_at_once = FiringConfig(sets=(tuple(range(24)),), step_period_s=0.1)
     ring = load_robot("denning").ring.model_copy(update={"firing": all_at_once})
     assert isinstance(make_driver(robot_with_driver("mine").model_copy(update={"ring": ring})), DenningDriver)
+
+
+def test_once_imported_families_are_named_without_a_further_import() -> None:
+    """An import takes a tenth of a second, and a HALT of the cycle in which a line fails would wait for it."""
+    check = (
+        "import sys\nfrom drivers.registry import import_families, other_robot\nimport_families()\n"
+        "before = set(sys.modules)\nassert other_robot('denning', b'') is None\nassert set(sys.modules) == before"
+    )
+    subprocess.run([sys.executable, "-c", check], check=True, timeout=120.0)

@@ -334,7 +334,7 @@ async def _whole_run(
             log.info("serial port found", ports=plugged, hint=f"this run is emulated; {runs}")
         control: TimeControl = NoTimeControl()
         line_messages = messages_on(settings.link.port)
-        importing = asyncio.create_task(asyncio.to_thread(import_rest))
+        importing = asyncio.create_task(asyncio.to_thread(import_rest, emulated=plan.emulated))
         if preparation is not None:
             running.push_async_callback(preparation.close)
             if preparation.first_start is not None:

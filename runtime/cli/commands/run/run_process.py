@@ -31,10 +31,18 @@ if TYPE_CHECKING:
     from runtime.timing.time_control import TimeControl
 
 
-def import_rest() -> None:
-    """Import what a run uses beside its cycles; that takes a third of a second."""
+def import_rest(*, emulated: bool) -> None:
+    """Import what a run uses beside its cycles; that takes a third of a second.
+
+    On a robot's line another robot may answer, and its name must not keep a HALT waiting; an emulator starts sooner.
+    """
     import runtime.cli.commands.run.serve_console
     import runtime.cycle.process  # noqa: F401 - for the modules alone
+
+    if not emulated:
+        from drivers.registry import import_families
+
+        import_families()
 
 
 async def run_process(
