@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Final
 
 from drivers.token_bucket import LineLimit
 from runtime.cycle.logs.mission_log import MissionLog
-from runtime.cycle.modes import Mode, ModeState
+from runtime.cycle.modes import STARTING, WAITING, Mode, ModeState
 from runtime.cycle.step import State
 from runtime.support.sd_notify import SdNotifier
 
@@ -20,6 +21,9 @@ HELD_S: Final = 2.0
 """A reason that ends sooner, as that of a start that waits, is not logged, s."""
 STOP_REASONS_MAX: Final = 1000
 """Reasons of stops that are kept; the oldest are dropped."""
+STOPPED: Final = frozenset({Mode.SAFE_STOP, Mode.FAULT, Mode.CONNECTING})
+NUMBER: Final = re.compile(r"\d+(\.\d+)?")
+"""What may change in a reason that is still the same: how long, how often, how many."""
 
 
 class ModeLog:
@@ -28,7 +32,7 @@ class ModeLog:
     Attributes
     ----------
     stop_reasons
-        Of the newest stops, and of lines that were lost before a drive, in order.
+        Of the newest stops, and of lines that were lost before a drive, in order; of one stop each that it had.
     hold_reasons
         Why the robot held in DRIVE for `HELD_S` or more, in order.
     missions
@@ -37,6 +41,8 @@ class ModeLog:
 
     def __init__(self, log: FilteringBoundLogger, notifier: SdNotifier) -> None:
         self.stop_reasons: list[str] = []
+        self._kept = set[str]()
+        """Those of the present stop, without their numbers."""
         self.missions = MissionLog(log)
         self._log = log
         self._notifier = notifier
@@ -50,6 +56,8 @@ class ModeLog:
         """Log the mode if it was entered since `before`, and why a robot in DRIVE holds, once that has lasted."""
         if state.mode.entered_since(before):
             self.entered(state, run_s)
+        elif state.mode.reason != before.reason:
+            self._keep(state.mode)
         self.missions.observe(state.drive_request, run_s)
         if state.hold_reason != self._held or self._held_run_s is None:
             self._held, self._held_run_s, self._is_logged = state.hold_reason, run_s, False
@@ -63,12 +71,20 @@ class ModeLog:
     def entered(self, state: State, run_s: float) -> None:
         """Log the mode that was entered at `run_s`."""
         mode = state.mode
-        if mode.mode in {Mode.SAFE_STOP, Mode.FAULT, Mode.CONNECTING} and mode.reason is not None:
-            self.stop_reasons.append(mode.reason)
-            del self.stop_reasons[:-STOP_REASONS_MAX]
+        self._kept.clear()
+        self._keep(mode)
         self._notifier.status(mode.mode.value if mode.reason is None else f"{mode.mode.value}: {mode.reason}")
         left_out = self._limit.take(run_s)
         if left_out is not None:
             more = {"suppressed_before": left_out} if left_out else {}
             write = self._log.error if mode.mode is Mode.FAULT else self._log.info
             write("mode", mode=mode.mode.value, reason=mode.reason, cycle=state.cycle, **more)
+
+    def _keep(self, mode: ModeState) -> None:
+        """Keep the reason of a stop, unless this stop has had it already."""
+        reason = (mode.reason or "").removeprefix(WAITING)
+        text = NUMBER.sub("", reason)
+        if mode.mode in STOPPED and reason not in {"", STARTING} and text not in self._kept:
+            self._kept.add(text)
+            self.stop_reasons.append(reason)
+            del self.stop_reasons[:-STOP_REASONS_MAX]

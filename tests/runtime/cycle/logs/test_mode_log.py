@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,7 +11,7 @@ import pytest
 import structlog
 
 from runtime.cycle.logs.mode_log import LINES_BURST, LINES_PER_S, STOP_REASONS_MAX, ModeLog
-from runtime.cycle.modes import Mode, ModeState
+from runtime.cycle.modes import RESTORED, STARTING, WAITING, Mode, ModeState
 from runtime.support.sd_notify import SdNotifier
 
 
@@ -33,3 +34,25 @@ def test_a_robot_that_changes_the_mode_in_every_cycle_fills_neither_log_nor_memo
     assert len(log.stop_reasons) == STOP_REASONS_MAX
     assert log.stop_reasons[-1] == f"reason {20 * seconds - 1}"
     assert re.fullmatch(r"reason \d+", lines[-1]["reason"])
+
+
+def drop(_logger: object, _name: str, _event: Any) -> Any:
+    raise structlog.DropEvent
+
+
+def test_of_one_stop_each_reason_is_kept_once_whatever_its_numbers() -> None:
+    """Why the line does not return may be another reason than why it was lost."""
+    log, before = ModeLog(structlog.wrap_logger(None, processors=[drop]), SdNotifier()), ModeState()
+    silent, deaf = "nothing received for {:.2f} s", "no answer to 3 HALT commands"
+    stop = ModeState(Mode.SAFE_STOP, 1.0)
+    reasons = [
+        silent.format(0.4), WAITING + silent.format(0.45), WAITING + STARTING, WAITING + deaf,
+        WAITING + silent.format(1.4), WAITING + deaf, f"{RESTORED} (what was wrong: {deaf})",
+    ]  # fmt: skip
+    for k, reason in enumerate(reasons):
+        state: Any = SimpleNamespace(mode=replace(stop, reason=reason), cycle=k, hold_reason=None, drive_request=None)
+        log.observe(state, before, 0.05 * k)
+        before = state.mode
+    assert log.stop_reasons == [silent.format(0.4), deaf, f"{RESTORED} (what was wrong: {deaf})"]
+    log.observe(state, ModeState(Mode.DRIVE), 2.0)
+    assert log.stop_reasons[3:] == [f"{RESTORED} (what was wrong: {deaf})"], "another stop"
