@@ -17,11 +17,13 @@ from runtime.recording.channels import (
     CHANNELS,
     CYCLE,
     RUN_INFO,
+    SCHEMAS,
     decode,
     encode,
     schema_of,
 )
 from runtime.recording.schema import Bookmark, LogLine, MapChange, Payload, RunInfo
+from tests import recording_schemas
 
 MARK = Bookmark(run_s=1.5, cycle=30, text="“here” <b>\n")
 
@@ -43,6 +45,11 @@ def test_a_payload_is_decoded_as_it_was_encoded(payload: Payload) -> None:
     assert encode(decode(type(payload), data)) == data
     assert b"\n" not in data
     jsonschema.validate(orjson.loads(data), orjson.loads(schema_of(type(payload))))
+
+
+def test_the_schemas_that_are_kept_are_those_of_the_models() -> None:
+    """Renew them with `python -m tests.recording_schemas`."""
+    assert recording_schemas.file() == SCHEMAS.read_bytes()
 
 
 @pytest.mark.parametrize("kind", dict.fromkeys(CHANNELS.values()))
