@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
 
 import numpy as np
-from llvmlite.binding import Linkage
+from llvmlite.binding import Linkage, parse_assembly
 from numba.core import compiler, config, event, sigutils, typed_passes, types, typing, untyped_passes
 from numba.core.caching import (
     IndexDataCacheFile,
@@ -182,19 +182,29 @@ class _KernelCache:
             data = _files()._load_data(self._name(sig, target_context))
         except FileNotFoundError:
             return None
+        called = data[1]  # numba calls no code of which it has not seen the name
+        target_context.codegen()._engine._defined_symbols |= {called.llvm_func_name, called.llvm_cpython_wrapper_name}
         return compiler.CompileResult._rebuild(target_context, *data)
 
     def save_overload(self, sig: Untyped, compiled: Untyped) -> None:
         """Keep the compiled code for a signature."""
         if not compiled.library.has_dynamic_globals:
             _Folder().ensure_cache_path()
-            _files()._save_data(self._name(sig, compiled.target_context), compiled._reduce())
+            (name, kind, (machine_code, _)), *rest = compiled._reduce()
+            # No intermediate code: no kernel links one that was loaded, and to read it takes half of the loading.
+            kept = (name, kind, (machine_code, parse_assembly("").as_bitcode()))
+            _files()._save_data(self._name(sig, compiled.target_context), (kept, *rest))
 
     def _name(self, sig: Untyped, target_context: Untyped) -> str:
         args, _ = sigutils.normalize_signature(sig)
-        processor = target_context.codegen().magic_tuple()
-        digest = _digests().of(self._kernel, f"{processor} {args}")
+        digest = _digests().of(self._kernel, f"{_processor(target_context.codegen())} {args}")
         return f"{self._kernel.__module__}.{self._kernel.__name__}-{digest[:NAME_DIGITS]}.nbc"
+
+
+@functools.cache
+def _processor(codegen: Untyped) -> str:
+    """Return what the machine code depends on: the processor; LLVM takes a while to say it."""
+    return str(codegen.magic_tuple())
 
 
 class _Folder(UserProvidedCacheLocator):  # type: ignore[misc]  # numba has no types
@@ -231,8 +241,8 @@ class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]  # numba has no typ
     """Compiles a kernel once for each type of its arguments; numba's own does so for each constant in a call."""
 
     def __init__(self, function: Callable[..., object], **options: object) -> None:
-        super().__init__(function, targetoptions={"nopython": True, **options})
-        self._compiler = _Compiler(function, self.targetdescr, self.targetoptions, self.locals, _Pipeline)
+        super().__init__(function, targetoptions={"nopython": True, **options}, pipeline_class=_Pipeline)
+        self._compiler.__class__ = _Compiler  # a new one would look for the signature again
         self._inner: dict[Args, tuple[object, Untyped]] = {}
         self._cache = _KernelCache(self, allocates=bool(options.get("_nrt", True)))
 

@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from perception.localization.known_room.known_room import KnownRoom
     from perception.localization.submaps.echo_lag import EchoLag
     from perception.mapping.grid.evidence_grid import EvidenceGrid
+    from perception.recognition import PreparedRecognition
 
 
 class Perception:
@@ -73,6 +74,7 @@ class Perception:
         Whether it recognises from the start. Until it does, the ring is heard and watched, and there is no map.
     """
 
+    SCRATCH: Final = ("_farthest_m", "prepared")
     BOUNDS: Final = bounds(_axes=CONSTANT, _half_angle=CONSTANT, _reach_m=CONSTANT, _sensors=CONSTANT)
 
     def __init__(
@@ -90,19 +92,17 @@ class Perception:
         self._ring = ring
         self.known_room: KnownRoom | None = None
         self.room: WorldConfig | None = None
-        self.grid: EvidenceGrid | None = None
-        """In the odometry's frame, where the settings have one."""
-        self.surfaces = NoSurfaces()
-        """The map of surfaces in the frame of `method`."""
+        self.grid: EvidenceGrid | None = None  # in the odometry's frame, where the settings have one
+        self.surfaces = NoSurfaces()  # in the frame of `method`
         self.echo_lag: EchoLag | None = None
+        self.prepared: PreparedRecognition | None = None  # from another thread, for `recognise`
         mounts = mounts_array(ring.mounts)
         self._axes, self._turning = mounts[:, 2].copy(), list(ring.turning)
         self._half_angle, self._models = math.radians(ring.beam_half_angle_deg), tuple(models)
         self._echoes = FreshEchoes(mounts, self._half_angle, ring.turning, ring.window_m)
-        self._reach_m, self._sensors = reach_m(ring), len(ring.mounts)
-        self.vacant = VacantAreas()
-        """In the frame of `method`."""
-        self.canyon_map = CanyonMap(2.0 * (farthest_m(ring.mounts) + PASSAGE_M) - ENDS_M)
+        self._reach_m, self._sensors, self._farthest_m = reach_m(ring), len(ring.mounts), farthest_m(ring.mounts)
+        self.vacant = VacantAreas()  # in the frame of `method`
+        self.canyon_map = CanyonMap(2.0 * (self._farthest_m + PASSAGE_M) - ENDS_M)
         """The box canyons found so far, in odometry's frame."""
         if recognises:
             self.recognise(models, config)
@@ -114,8 +114,8 @@ class Perception:
 
     def recognise(self, models: Sequence[ModelConfig], config: PerceptionConfig, *, on: bool = True) -> None:
         """Begin to recognise these models, with an empty map, as at a start; or stop, and have no map."""
-        self._models = tuple(models)
-        parts = begin_recognition(self._ring, models, config) if on else NO_RECOGNITION
+        self._models, (ready, self.prepared) = tuple(models), (self.prepared, None)
+        parts = begin_recognition(self._ring, self._models, config, ready) if on else NO_RECOGNITION
         self.method, self._other, self.map_frame, self.known_room, self.grid, self.surfaces, self.echo_lag = parts
         self.room = config.localization.known_room if on else None
 
@@ -290,7 +290,7 @@ class Perception:
 
     def _with_feet(self, points: Floats, pose: Pose) -> Floats:
         """Return places of echoes, and the feet of near objects that none of them stands for."""
-        return with_unheard_feet(points, self.near_objects(), self._models, pose, farthest_m(self._ring.mounts))
+        return with_unheard_feet(points, self.near_objects(), self._models, pose, self._farthest_m)
 
     @property
     def unheard(self) -> UnheardEchoes:

@@ -20,6 +20,9 @@ from runtime.cycle.step import State
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
+    from perception.recognition import PreparedRecognition
+    from runtime.support.kernel_loader import InThread
+
 POLL_S: Final = 0.2
 """Time between two looks at whether the start still has a use, s."""
 
@@ -41,8 +44,8 @@ class Preparation(Protocol):
     async def ring(self, settings: Settings) -> None:
         """Return when the ring can be heard and checked without compiling anything."""
 
-    async def __call__(self, settings: Settings) -> None:
-        """Return when recognition with these settings can run without compiling anything."""
+    async def __call__(self, settings: Settings, in_thread: InThread, /) -> PreparedRecognition | None:
+        """Return what recognition with these settings begins with, when it can run without compiling anything."""
 
 
 class Connects(Protocol):
@@ -76,6 +79,10 @@ class RunningPreparation:
         Called once recognition is ready, between two cycles: it takes milliseconds.
     on_starting : callable, optional
         Gets the progress before the first cycle.
+    in_thread : callable, optional
+        Calls functions in threads; by default also while a cycle runs.
+    perception : Perception, optional
+        Of the run; gets what recognition begins with.
     """
 
     def __init__(
@@ -84,11 +91,15 @@ class RunningPreparation:
         log: FilteringBoundLogger,
         on_ready: Callable[[], None],
         on_starting: Callable[[str], None] | None = None,
+        in_thread: InThread = asyncio.to_thread,
+        perception: Perception | None = None,
     ) -> None:
         self._preparation = preparation
         self._log = log
         self._on_ready = on_ready
         self._on_starting = on_starting
+        self._in_thread = in_thread
+        self._perception = perception
         self._task: asyncio.Task[None] | None = None
         self._logged_run_s = -math.inf
 
@@ -165,7 +176,9 @@ class RunningPreparation:
             ring.cancel()
 
     async def _prepare(self, preparation: Preparation, settings: Settings) -> None:
-        await preparation(settings)
+        prepared = await preparation(settings, self._in_thread)
+        if self._perception is not None:
+            self._perception.prepared = prepared
         self._on_ready()
 
     async def close(self) -> None:

@@ -128,9 +128,10 @@ class RobotProcess:
         self._notifier = SdNotifier() if notifier is None else notifier
         self.health = Health(log)
         self._driver = make_driver(settings)
-        self._preparation = RunningPreparation(preparation, log, self._on_prepared, observers.on_starting)
         self._state = fresh_state(settings, recognises=preparation is None)
         self._scheduler = CycleScheduler(settings, self._clock, CALLBACKS)
+        used = (self._scheduler.gaps.to_thread, self._state.perception)
+        self._preparation = RunningPreparation(preparation, log, self._on_prepared, observers.on_starting, *used)
         timed = self.timing_monitor.timed
         handlers = (timed(LINE_OPENED, self._on_opened), timed(LINK_RECEIVE, self._on_data))
         self._link = Link(settings.link, *handlers, timed(LINE_LOST, self._on_closed), **line_options(settings))
@@ -142,8 +143,7 @@ class RobotProcess:
         self._connection = Connection(*line, settings.body, line_messages)
         self._memory = MemoryPolicy(timed(COLLECTION, gc.collect))
         self._mode_log = ModeLog(log, self._notifier)
-        self._object_log = ObjectLog(log)
-        self._line_log = LineLog(log, line_messages)
+        self._object_log, self._line_log = ObjectLog(log), LineLog(log, line_messages)
         self._alerts = Alerts()
         self._request: Request | None = None
         self._is_request_valid = always_valid

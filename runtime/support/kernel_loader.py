@@ -14,7 +14,7 @@ import signal
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, ParamSpec, Protocol, TypeVar
 
 from config.errors import FAILED, UserError
 from config.files import one_line
@@ -42,6 +42,11 @@ from runtime.support.kernel_warmup import CompilationEnded, compile_parts, follo
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
+
+    from perception.recognition import PreparedRecognition
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 COMPILING_MAX_S: Final = 600.0
 """Time limit for the compiling process: ten times what it usually takes at low priority beside a driving robot."""
@@ -79,6 +84,13 @@ RING_WAIT: Final = "the kernels that driving needs are being prepared"
 FIRST_START: Final = (
     "the kernels that driving needs are being compiled, once for this version: that takes some seconds"
 )
+
+
+class InThread(Protocol):
+    """Calls a function in another thread, as `asyncio.to_thread` does; see `runtime.timing.cycle_gaps`."""
+
+    async def __call__(self, call: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Return what the call returns."""
 
 
 class KernelLoader:
@@ -205,8 +217,10 @@ class KernelPreparation:
         await self.begin_ring(settings)
         self.progress = PREPARING
 
-    async def __call__(self, settings: Settings) -> None:
-        """Return when no kernel of the other parts is left to compile or to load.
+    async def __call__(self, settings: Settings, in_thread: InThread = asyncio.to_thread) -> PreparedRecognition:
+        """Return what recognition begins with, when no kernel of the other parts is left to compile or to load.
+
+        Both are loaded and made in threads of `in_thread`.
 
         Raises
         ------
@@ -231,7 +245,10 @@ class KernelPreparation:
             await asyncio.sleep(COUNT_PERIOD_S)
         for number, part in enumerate(self._parts, 1):
             self.progress = f"{PREPARING}: its kernels are being loaded, part {number} of {len(self._parts)}"
-            await asyncio.to_thread(warm_up, settings, [part])
+            await in_thread(warm_up, settings, [part])
+        from perception.recognition import prepare_recognition
+
+        return await in_thread(prepare_recognition, settings.ring, settings.models, settings.perception)
 
     def _why_ended(self) -> str:
         """Return how the compiling process ended, in brackets; empty if that is not known."""

@@ -11,6 +11,7 @@ from typing import Final
 
 from config.settings import Settings
 from runtime.timing.clock_sampler import ClockSample, ClockSampler
+from runtime.timing.cycle_gaps import CycleGaps
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.pacing import CycleStart, Pacer
 from runtime.timing.run_clock import run_clock
@@ -45,6 +46,8 @@ class CycleScheduler:
         Durations and lateness of all cycles.
     timing_monitor : TimingMonitor
         Measures the phases of each cycle and the callbacks between two.
+    gaps : CycleGaps
+        Runs work in threads that rest in cycles.
     """
 
     def __init__(self, settings: Settings, clock: Callable[[], float], callbacks: tuple[str, ...] = ()) -> None:
@@ -58,6 +61,7 @@ class CycleScheduler:
         self._clock.on_change(self._waker.wake)
         self._stall_sampler = StallSampler()
         self._pacer: Pacer | None = None
+        self.gaps = CycleGaps()
         self.stats = CycleStats(LATE_SHARE * self._period_s, is_touched=True)
         self.timing_monitor = TimingMonitor(
             self.stats, sampler.read, lambda: self._stall_sampler.sample, callbacks, sampler.read_after
@@ -91,6 +95,7 @@ class CycleScheduler:
         """Begin a cycle and return how it begins."""
         pacer = self._started()
         period_s, is_following = pacer.period_s, pacer.is_locked
+        self.gaps.begin()
         self._clock.cycle_began()
         start = pacer.begin(now.run_s)
         self.timing_monitor.begin(now, start, period_s, is_following=is_following)
@@ -100,7 +105,10 @@ class CycleScheduler:
     def end(self, run_s: float) -> float:
         """End the cycle at `run_s`; return the time until the next one, s."""
         self.timing_monitor.end()
-        return self._started().advance(run_s) - run_s
+        pacer = self._started()
+        slack_s = pacer.advance(run_s) - run_s
+        self.gaps.end(min(slack_s, pacer.due_s - run_s))
+        return slack_s
 
     def quiet_s(self, run_s: float) -> float:
         """Return for how long after `run_s` no echo is expected, s; zero while the run's time is scaled or paused."""

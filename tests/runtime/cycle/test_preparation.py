@@ -23,6 +23,7 @@ from runtime.cycle.modes import Mode
 from runtime.cycle.preparation import RunningPreparation, fresh_state
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, Refused, State, step
+from runtime.support.kernel_loader import InThread
 from runtime.timing.cycle_stats import CycleStats
 from tests.runtime.virtual_time import in_virtual_time
 
@@ -46,7 +47,7 @@ class Preparation:
         await asyncio.sleep(self._ring_s)
         self.has_ring = settings.ring == SETTINGS.ring
 
-    async def __call__(self, settings: Settings) -> None:
+    async def __call__(self, settings: Settings, _in_thread: InThread) -> None:
         assert self.has_ring
         assert settings.ring == SETTINGS.ring
         try:

@@ -1,0 +1,79 @@
+"""Work beside the cycles that rests while a cycle is due: Python runs one thread at a time.
+
+A thread that works while a cycle runs takes the interpreter from it for milliseconds, each time that the cycle calls
+the system. So what a start still has to do once the robot drives is done in threads that look at each call of a
+function how far away the next cycle is.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Final, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+MARGIN_S: Final = 0.01
+"""Rest from this time before a cycle, s: the longest that one function of LLVM holds the interpreter."""
+REST_MAX_S: Final = 0.1
+"""Longest rest, s: while time is paused no cycle comes, and the thread may hold a lock that the loop needs."""
+
+
+class CycleGaps:
+    """Runs functions in threads that work only between cycles.
+
+    Parameters
+    ----------
+    clock : callable
+        Monotonic, s.
+    rest_max_s : float
+        Longest rest.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic, rest_max_s: float = REST_MAX_S) -> None:
+        self._clock = clock
+        self._rest_max_s = rest_max_s
+        self._until_s = math.inf
+        """Until when threads may work; −inf in a cycle."""
+        self._opened = threading.Event()
+        self._threads = 0
+
+    def begin(self) -> None:
+        """Let threads rest: a cycle begins."""
+        self._until_s = -math.inf
+
+    def end(self, gap_s: float) -> None:
+        """Let threads work: a cycle has ended, and the next one is due in `gap_s`."""
+        self._until_s = self._clock() + gap_s - MARGIN_S
+        if self._threads:
+            self._opened.set()
+
+    async def to_thread(self, call: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Call a function in a thread that rests in cycles, and return what it returns."""
+
+        def resting() -> R:
+            before = sys.gettrace()
+            sys.settrace(self._rest)
+            try:
+                return call(*args, **kwargs)
+            finally:
+                sys.settrace(before)
+
+        self._threads += 1
+        try:
+            return await asyncio.to_thread(resting)
+        finally:
+            self._threads -= 1
+
+    def _rest(self, *_: object) -> None:
+        """Rest until the next gap, if none is now: Python calls this for each function that the thread calls."""
+        if self._clock() < self._until_s:
+            return
+        self._opened.clear()
+        if self._clock() >= self._until_s and not self._opened.wait(self._rest_max_s):  # it may have opened meanwhile
+            self._until_s = max(self._until_s, self._clock() + self._rest_max_s)
