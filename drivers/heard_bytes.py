@@ -106,6 +106,8 @@ def _last_line(data: bytes) -> str | None:
     runs = _RUN.findall(data)
     if len(data) >= _TEXT_MIN and sum(map(len, runs)) >= _TEXT_SHARE * len(data):
         return str(runs[-1].decode("ascii").strip())
+    if len(data) < _PRINTABLE_MIN:  # so it is at each command that the robot gets
+        return None
     text = data.decode(errors="replace")
     printable = sum(c in "\t\r\n" or (c.isprintable() and c != "\ufffd") for c in text)
     if printable < _PRINTABLE_MIN or printable < _PRINTABLE_SHARE * len(text):
