@@ -86,6 +86,8 @@ async def test_long_work_says_how_far_it_is_and_what_it_made(server: FakeServer,
     await opened.says("#toasts", "cancelled")
     await server.send(job(job=2, over=True, share=1.0, what="done", made=["first.toml", "first.geojson"]))
     await opened.says("#made", f"Map of {FIRST}")
+    await page.set_viewport_size({"width": DESKTOP[0], "height": DESKTOP[1]})
+    await expect(page.locator("#made a").first).to_be_in_viewport()
     links = [await a.get_attribute("href") for a in await page.locator("#made a").all()]
     assert links == [f"/made?job=2&file=first.{suffix}&token={TOKEN}" for suffix in ("toml", "geojson")]
 
