@@ -93,10 +93,26 @@ def fit_beams(looks: Looks, sensors: int) -> BeamFit:
     sensors
         Number of sensors of the ring.
     """
-    coarse, fine = (np.arange(-TURN_MAX_RAD, TURN_MAX_RAD + 0.5 * step, step) for step in TURN_STEPS_RAD)
+    coarse = _turns(TURN_STEPS_RAD[0])
     half_angle, everything = _best_beam(looks, sensors, coarse, HALF_ANGLES_RAD, (False, True))
     between = (half_angle + k * HALF_ANGLE_STEP_RAD for k in range(-7, 8))
     half_angle, everything = _best_beam(looks, sensors, coarse, between, (everything,))
+    return fit_directions(looks, sensors, half_angle, everything=everything)
+
+
+def fit_directions(looks: Looks, sensors: int, half_angle: float, *, everything: bool) -> BeamFit:
+    """Return the directions that explain the looks best, of sensors whose beam is known.
+
+    Parameters
+    ----------
+    looks, sensors
+        As for `fit_beams`.
+    half_angle
+        Half of the beam's opening, rad.
+    everything
+        Whether all in the beam answers, not only mirrors.
+    """
+    fine = _turns(TURN_STEPS_RAD[1])
     likelihood = _likelihoods(looks, sensors, fine, half_angle, everything=everything)
     share = np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
     share /= share.sum(axis=1, keepdims=True)
@@ -107,6 +123,11 @@ def fit_beams(looks: Looks, sensors: int) -> BeamFit:
         few = np.bincount(looks.sensor[edge & side], minlength=sensors) < LOOKS_MIN
         mean[few], sigma[few] = 0.0, math.inf
     return BeamFit(mean, sigma, half_angle, everything)
+
+
+def _turns(step_rad: float) -> Floats:
+    """Return the errors of a direction that are tried, rad."""
+    return np.arange(-TURN_MAX_RAD, TURN_MAX_RAD + 0.5 * step_rad, step_rad)
 
 
 def _best_beam(

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import Firing
-from perception.calibration.beam_fit import HALF_ANGLE_STEP_RAD, BeamFit, Looks, fit_beams
+from perception.calibration.beam_fit import HALF_ANGLE_STEP_RAD, BeamFit, Looks, fit_beams, fit_directions
 from perception.calibration.drive import Drive, Scales, drive_of
 from perception.calibration.geometry_fit import (
     GATE_SIGMAS,
@@ -54,6 +54,27 @@ leave 0.004 to 0.03. Drives without a whole turn left 0.2 to 1 of that of the tu
 wrong."""
 PLACE_SHOWN: Final = 0.25
 """The same of a place. Suitable drives leave 0.04 to 0.24, the latter if they are quick."""
+HALF_SHOWN: Final = 0.5
+"""A sensor's place takes part in the comparison of both halves of a drive if each leaves at most this share of its
+standard deviation before the drive."""
+CHANCE_SIGMAS: Final = 3.09
+"""Values of one kind are changed only if noise alone would make them differ by so much in 1 of 1,000 drives."""
+
+
+class Halves(NamedTuple):
+    """How far the fits to the two halves of a drive differ: a drive among unknown objects contradicts itself.
+
+    Each but the last is a mean square over the one that the fits' own variances explain (Birge's ratio).
+    """
+
+    scales: Floats
+    """Of each scale, shape (3,)."""
+    places: float
+    """Of the sensors' places and the scales together."""
+    directions: float
+    """Of the sensors' directions."""
+    half_angle: float
+    """Difference between both half angles of the beam, rad."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +82,8 @@ class Calibration:
     """What a drive shows of a robot.
 
     What it does not show has its nominal value, and infinite as its uncertainty. What differs from the nominal value
-    by no more than the noise of the drive explains has that value, too, with its own uncertainty.
+    by no more than the noise of the drive explains has that value, too, with its own uncertainty. Where the
+    halves of the drive differ by more than their noise explains, the uncertainties are greater by as much.
 
     Attributes
     ----------
@@ -129,8 +151,7 @@ def calibrate(
     """
     drive = drive_of(firings, ring.range_min_m + ring.resolution_m)
     nominal, half_angle = np.array(ring.mounts), math.radians(ring.beam_half_angle_deg)
-    firing, sensor = np.nonzero(np.isfinite(drive.ranges))
-    echoes = Echoes(firing, sensor, drive.ranges[firing, sensor])
+    echoes = _echoes_of(drive)
     # At first, readings count only so far within the beam that the sensor hears the surface for sure.
     angles, inside = nominal[:, 2], max(0.5 * half_angle, half_angle - UNSURE_RAD)
     start = _first_guess(drive, echoes, nominal, inside, half_angle, radii, way_m, synchro=synchro)
@@ -141,9 +162,55 @@ def calibrate(
         beam_fit = fit_beams(_looks(drive, fit, nominal[:, 2], synchro=synchro), len(nominal))
         angles = nominal[:, 2] + beam_fit.turns
         inside = beam_fit.half_angle
-    # A bearing is as wrong as the sensor's place is, seen from what it hears.
-    turn_sigmas = np.hypot(beam_fit.sigmas, fit.mount_sigmas_m / np.median(echoes.range_m))
-    return _shown(fit, beam_fit, turn_sigmas, nominal, half_angle)
+    halves = _halves(drive, fit, beam_fit, nominal, synchro=synchro)
+    return _shown(fit, beam_fit, _turn_sigmas(beam_fit, fit, echoes), halves, nominal, half_angle)
+
+
+def _echoes_of(drive: Drive) -> Echoes:
+    """Return the finite readings of a drive."""
+    firing, sensor = np.nonzero(np.isfinite(drive.ranges))
+    return Echoes(firing, sensor, drive.ranges[firing, sensor])
+
+
+def _turn_sigmas(beams: BeamFit, fit: GeometryFit, echoes: Echoes) -> Floats:
+    """Return the standard deviations of the directions, rad; a bearing is as wrong as the sensor's place is."""
+    return np.hypot(beams.sigmas, fit.mount_sigmas_m / np.median(echoes.range_m))
+
+
+def _halves(drive: Drive, fit: GeometryFit, beam_fit: BeamFit, nominal: Floats, *, synchro: bool) -> Halves:
+    """Return how far fits to the first and to the second half of the readings differ."""
+    geometry, half = fit.geometry, len(drive.ranges) // 2
+    start = Geometry(geometry.scales, geometry.surfaces, nominal[:, :2], np.zeros(drive.knots))
+    angles, everything = nominal[:, 2] + beam_fit.turns, beam_fit.everything_echoes
+    fits, directions, sigmas, half_angles = [], [], [], []
+    for others in (slice(half, None), slice(None, half)):
+        ranges = drive.ranges.copy()
+        ranges[others] = np.nan
+        part = replace(drive, ranges=ranges)
+        echoes = _echoes_of(part)
+        if not len(echoes.sensor):
+            return Halves(np.full(3, np.inf), math.inf, math.inf, math.inf)
+        found = fit_geometry(part, echoes, angles, beam_fit.half_angle, start, PRIORS, None, synchro=synchro)
+        looks = _looks(part, found, nominal[:, 2], synchro=synchro)
+        beams = fit_directions(looks, len(nominal), beam_fit.half_angle, everything=everything)
+        fits.append(found)
+        directions.append(beams.turns)
+        sigmas.append(_turn_sigmas(beams, found, echoes))
+        half_angles.append(fit_beams(looks, len(nominal)).half_angle)
+    one, other = fits
+    variances = np.array(one.scale_sigmas) ** 2 + np.array(other.scale_sigmas) ** 2
+    scales = (np.array(one.geometry.scales) - np.array(other.geometry.scales)) ** 2 / variances
+    is_known = np.maximum(one.mount_sigmas_m, other.mount_sigmas_m) <= HALF_SHOWN * PRIORS.mount_m
+    apart = ((one.geometry.mounts - other.geometry.mounts) ** 2).sum(axis=1)[is_known]
+    places = apart / (one.mount_sigmas_m**2 + other.mount_sigmas_m**2)[is_known]
+    variance = sigmas[0] ** 2 + sigmas[1] ** 2
+    turns = ((directions[0] - directions[1]) ** 2 / variance)[np.isfinite(variance)]
+    return Halves(
+        scales,
+        float(places.sum() + scales.sum()) / (2 * len(places) + len(scales)),
+        float(turns.mean()) if len(turns) else 1.0,
+        abs(half_angles[0] - half_angles[1]),
+    )
 
 
 def _first_guess(
@@ -219,43 +286,62 @@ def _looks(drive: Drive, fit: GeometryFit, angles: Floats, *, synchro: bool) -> 
     return Looks(fired.sensor[look], turned[surface, look], d, radii[surface], read[look], fit.noise.sigmas(d))
 
 
-def _shown(fit: GeometryFit, beams: BeamFit, turn_sigmas: Floats, nominal: Floats, half_angle: float) -> Calibration:
+def _shown(
+    fit: GeometryFit, beams: BeamFit, turn_sigmas: Floats, halves: Halves, nominal: Floats, half_angle: float
+) -> Calibration:
     """Return what the drive shows, with nominal values for what it does not show.
 
-    The places of sensors in the ring follow from its turns: where the turn's scale is not shown, no place is.
+    The places of sensors in the ring follow from its turns: where the turn's scale is not shown, no place is. A turn
+    on the spot shows those of all sensors alike, so what shows those of fewer than half of them is chance.
     """
-    geometry, sigmas = fit.geometry, fit.scale_sigmas
-    is_shown = np.array(sigmas) <= SCALE_SHOWN * PRIORS.scale
-    has_place = (fit.mount_sigmas_m <= PLACE_SHOWN * PRIORS.mount_m) & (fit.readings > 0) & is_shown[1]
+    geometry = fit.geometry
+    sigmas = np.array(fit.scale_sigmas) * np.sqrt(np.maximum(1.0, np.maximum(halves.scales, halves.places)))
+    place_sigmas = fit.mount_sigmas_m * math.sqrt(max(1.0, halves.places))
+    # A beam's axis lies between its edges: what moves an edge moves the axis as far as the half angle.
+    turn_sigmas = np.hypot(turn_sigmas * math.sqrt(max(1.0, halves.directions)), 0.5 * halves.half_angle)
+    is_shown = sigmas <= SCALE_SHOWN * PRIORS.scale
+    has_place = (place_sigmas <= PLACE_SHOWN * PRIORS.mount_m) & (fit.readings > 0) & is_shown[1]
+    has_place &= 2 * int(has_place.sum()) >= len(nominal)
     has_angle = has_place & np.isfinite(turn_sigmas)
     mounts = nominal.copy()
-    is_elsewhere = has_place & _is_gain(geometry.mounts - nominal[:, :2], fit.mount_sigmas_m)
-    is_turned = has_angle & _is_gain(beams.turns[:, None], turn_sigmas)
+    is_elsewhere = _is_gain(geometry.mounts - nominal[:, :2], place_sigmas, has_place)
+    is_turned = _is_gain(beams.turns[:, None], turn_sigmas, has_angle)
     mounts[is_elsewhere, :2] = geometry.mounts[is_elsewhere]
     mounts[is_turned, 2] += beams.turns[is_turned]
-    is_wider = has_angle.any() and abs(beams.half_angle - half_angle) > HALF_ANGLE_STEP_RAD
-    is_scaled = is_shown & _is_gain(np.array(geometry.scales)[:, None] - 1.0, np.array(sigmas))
+    least = max(HALF_ANGLE_STEP_RAD, halves.half_angle)
+    is_wider = has_angle.any() and abs(beams.half_angle - half_angle) > least
+    changes = np.array(geometry.scales)[:, None] - 1.0
+    is_scaled = [_is_gain(changes[i : i + 1], sigmas[i : i + 1], is_shown[i : i + 1])[0] for i in range(3)]
     return Calibration(
         mounts,
-        np.where(has_place, fit.mount_sigmas_m, np.inf),
+        np.where(has_place, place_sigmas, np.inf),
         np.where(has_angle, turn_sigmas, np.inf),
         fit.readings,
         beams.half_angle if is_wider else half_angle,
         beams.everything_echoes,
         Scales(*(value if taken else 1.0 for value, taken in zip(geometry.scales, is_scaled, strict=True))),
-        Scales(*(sigma if shown else math.inf for sigma, shown in zip(sigmas, is_shown, strict=True))),
+        Scales(*np.where(is_shown, sigmas, math.inf).tolist()),
         fit.noise,
         len(geometry.surfaces.walls),
         len(geometry.surfaces.drums),
-        bool(is_wider or is_elsewhere.any() or is_turned.any() or is_scaled.any()),
+        bool(is_wider or is_elsewhere.any() or is_turned.any() or any(is_scaled)),
     )
 
 
-def _is_gain(change: Floats, sigma: Floats) -> NDArray[np.bool_]:
-    """Return whether changes (shape (n, k)) bring values nearer to the truth than the nominal ones are.
+def _is_gain(change: Floats, sigma: Floats, shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which changes (shape (n, k)) of one kind bring values nearer to the truth than the nominal ones are.
 
     A fit is off by kσ² in the mean square, and the nominal value by what the change's square exceeds kσ² (Akaike's
-    criterion). `sigma` is that of each component, shape (n,).
+    criterion). None is taken over if noise alone explains all that are shown: if the sum of their squares exceeds it
+    in more than 1 of 1,000 drives (Wilson and Hilferty's approximation). `sigma` is that of each component, shape
+    (n,).
     """
-    found: NDArray[np.bool_] = (change**2).sum(axis=1) > 2.0 * change.shape[1] * sigma**2
+    ratio = (change**2).sum(axis=1) / sigma**2
+    components = change.shape[1]
+    freedom = components * int(shown.sum())
+    if freedom == 0:
+        return shown
+    spread = 2.0 / (9.0 * freedom)
+    noise = freedom * (1.0 - spread + CHANCE_SIGMAS * math.sqrt(spread)) ** 3
+    found: NDArray[np.bool_] = shown & (ratio > 2.0 * components) & bool(ratio[shown].sum() > noise)
     return found

@@ -27,6 +27,8 @@ from tests.calibration_drive import (
 
 pytestmark = pytest.mark.compiled
 
+FURNISHED = {"furnished", "glimpse"}
+"""Kinds of drives through a furnished room, all others by a wall and a drum."""
 LEGS = {
     "stand": ((0.0, 0.0, 20.0),),
     "straight": ((0.15, 0.0, 20.0),),
@@ -34,6 +36,7 @@ LEGS = {
     "short": ((0.0, 0.3, 10.0), (0.1, 0.0, 5.0)),
     "turn": ((0.0, 0.3, 40.0),),
     "furnished": ((0.05, 0.3, 20.0), (0.05, -0.3, 20.0), (0.0, 0.4, 20.0)),
+    "glimpse": ((0.05, 0.4, 8.0), (0.05, -0.4, 4.0)),
 }
 """Speed (m/s), turning rate (rad/s) and time (s) of each leg."""
 SIGMAS = 4.0
@@ -63,7 +66,7 @@ def drawn(kind: str, seed: int, *, is_as_filed: bool = False) -> CalibrationDriv
             "sound_speed_scale": 1.0 / ranges,
         }
     )
-    world = furnished_room(seed).world if kind == "furnished" else WorldConfig(drum=(DRUM,), wall=(WALL,))
+    world = furnished_room(seed).world if kind in FURNISHED else WorldConfig(drum=(DRUM,), wall=(WALL,))
     scene = compile_scene(world)
     odometry = OdometryConfig(scale=distance, turn_scale=turn, heading_rad_per_sqrt_m=0.002)
     body, sonar = Body(BODY, scene, Pose(0.0, 0.0, 0.0), odometry, rng), Sonar(true, scene, acoustics, rng)
@@ -99,15 +102,15 @@ def assert_no_worse(drive: CalibrationDrive, found: Calibration) -> None:
 @pytest.mark.parametrize(
     ("kind", "has_way"),
     [
-        *((kind, False) for kind in LEGS if kind != "furnished"),
+        *((kind, False) for kind in LEGS if kind not in FURNISHED),
         pytest.param("straight", True, marks=pytest.mark.soak),
-        pytest.param("furnished", False, marks=pytest.mark.soak),
+        *(pytest.param(kind, False, marks=pytest.mark.soak) for kind in sorted(FURNISHED)),
     ],
 )  # fmt: skip
 def test_a_calibrated_robot_is_no_worse_than_its_file(kind: str, has_way: bool, seed: int) -> None:
     drive = drawn(kind, seed)
     assert not has_way or drive.way_m > 1.0
-    radii = [] if kind == "furnished" else [DRUM.radius_m]
+    radii = [] if kind in FURNISHED else [DRUM.radius_m]
     way_m = drive.way_m if has_way else None
     found = calibrate(drive.firings, drive.nominal, radii, way_m, synchro=False)
     if found is None:
@@ -122,12 +125,23 @@ def test_a_calibrated_robot_is_no_worse_than_its_file(kind: str, has_way: bool, 
     assert found.has_gain == changed
 
 
-def test_of_a_robot_that_is_as_its_file_says_nothing_is_changed() -> None:
-    drive = drawn("turn", 3, is_as_filed=True)
-    found = calibrate(drive.firings, drive.nominal, [DRUM.radius_m], None, synchro=False)
+@pytest.mark.parametrize(
+    ("kind", "seed"),
+    [
+        ("turn", 3), ("glimpse", 2),
+        *(pytest.param(kind, seed, marks=pytest.mark.soak) for kind in sorted(FURNISHED) for seed in range(3, 12)),
+    ],
+)  # fmt: skip
+def test_of_a_robot_that_is_as_its_file_says_nothing_is_changed(kind: str, seed: int) -> None:
+    """A glimpse of a furnished room had shown a turn scale 3 % off, and sensors 7 cm away."""
+    drive = drawn(kind, seed, is_as_filed=True)
+    radii = [] if kind in FURNISHED else [DRUM.radius_m]
+    found = calibrate(drive.firings, drive.nominal, radii, None, synchro=False)
     assert found is not None
-    assert found.shows_any
+    assert found.shows_any or kind != "turn"
     assert not found.has_gain
+    assert (found.mounts == np.array(drive.nominal.mounts)).all()
+    assert found.scales == (1.0, 1.0, 1.0)
 
 
 def test_a_suitable_drive_still_improves() -> None:
