@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, TypeGuard
 
 from pydantic import BaseModel
 
@@ -78,7 +78,11 @@ class Difference:
         return any(".".join(keys[:n]) in sections for n in range(1, len(keys) + 1))
 
     def __str__(self) -> str:
-        return f"{self.path}: {_shown(self.before)} → {_shown(self.after)}"
+        before, after = self.before, self.after
+        if _is_tables(before) and _is_tables(after):
+            others = " (others)" if len(before) == len(after) else ""
+            return f"{self.path}: {len(before)} → {len(after)} entries{others}"
+        return f"{self.path}: {_shown(before)} → {_shown(after)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +124,11 @@ def differences(before: object, after: object, at: Location = ()) -> Iterator[Di
             yield from differences(getattr(before, key), getattr(after, key), (*at, key))
     elif before != after:
         yield Difference(at, before, after)
+
+
+def _is_tables(value: object) -> TypeGuard[tuple[BaseModel, ...]]:
+    """Return whether a value is a list of tables, which have no short text."""
+    return isinstance(value, tuple) and all(isinstance(one, BaseModel) for one in value)
 
 
 def _shown(value: object) -> str:

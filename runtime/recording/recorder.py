@@ -43,6 +43,7 @@ from runtime.recording.writer import (
     SettingsReload,
 )
 from runtime.support.kernel_cache import is_interpreted, kernels_key
+from runtime.support.log_sentence import field_text
 from runtime.timing.run_clock import RunClock, run_clock
 
 WRITE_S: Final = 0.2
@@ -270,7 +271,7 @@ class Recorder:
             run_s=run_s,
             level=str(event.get("level", "info")),
             event=str(event.get("event", "")),
-            fields={name: str(value) for name, value in fields.items()},
+            fields={name: field_text(value) for name, value in fields.items()},
         )
         self._put((LOG, host_s, run_s, line))
 

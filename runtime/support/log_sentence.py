@@ -23,7 +23,7 @@ def sentence(event: str, fields: Mapping[str, object]) -> str:
     fields : mapping
         What else is known; fields without a value are left out.
     """
-    known = {name: text for name, value in fields.items() if (text := _text(value)) not in NOTHING}
+    known = {name: text for name, value in fields.items() if (text := field_text(value)) not in NOTHING}
     what, reason = known.pop(event, None), known.pop("reason", None)
     head = event if what is None else f"{event} {what}"
     said = f"{head[:1].upper()}{head[1:]}{'' if reason is None else f': {reason}'}"
@@ -32,7 +32,8 @@ def sentence(event: str, fields: Mapping[str, object]) -> str:
     return said if said.endswith((".", "!", "?")) else f"{said}."
 
 
-def _text(value: object) -> str:
+def field_text(value: object) -> str:
+    """Return a field's value as text, the entries of a list one after another."""
     return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
 

@@ -12,6 +12,7 @@ import pytest
 from pydantic import BaseModel
 
 from config.load import ConfigError, load_settings
+from config.places import PlaceConfig
 from config.reload import LIVE_SETTINGS, Difference, differences, reload
 from config.settings import Settings
 from tests.config.test_every_field import EVERY, Setting, holder
@@ -57,12 +58,18 @@ def test_settings_that_an_operator_changes_while_driving_are_live() -> None:
         assert Difference(tuple(path.split(".")), 1, 2).live, path
 
 
+def test_lists_of_tables_are_counted() -> None:
+    a, b = (PlaceConfig(name=name, x_m=0.0, y_m=0.0) for name in "ab")
+    said = [str(Difference(("places", "place"), before, after)) for before, after in (((), (a,)), ((a,), (b,)))]
+    assert said == ["places.place: 0 → 1 entries", "places.place: 1 → 1 entries (others)"]
+
+
 def test_adding_a_model_is_live_and_replacing_one_is_not(tmp_path: Path) -> None:
     before = settings_from(tmp_path, RUN)
     more = {**RUN, "models": [MODEL, {**MODEL, "name": "b"}]}
     outcome = reload(before, lambda: settings_from(tmp_path, more))
     assert (outcome.problems, [m.name for m in outcome.settings.models]) == ((), ["corner", "b"])
-    assert [str(d) for d in outcome.changed] == ["models: [{…}] → [{…}, {…}]"]
+    assert [str(d) for d in outcome.changed] == ["models: 1 → 2 entries"]
     for models in ([{**MODEL, "name": "b"}], [{**MODEL, "name": "b"}, MODEL], [{**MODEL, "arc_radius_m": 2.0}]):
         outcome = reload(before, lambda models=models: settings_from(tmp_path, {**RUN, "models": models}))  # type: ignore[misc]
         assert len(outcome.problems) == 1
@@ -99,7 +106,7 @@ def test_every_live_change_is_named_and_applied(tmp_path: Path) -> None:
         (lambda t: t["ring"].update(count=16), "ring.count: 24 → 16: needs a restart"),
         (lambda t: t["cycle"].update(rate_hz=40.0), "cycle.rate_hz: 20.0 → 40.0: needs a restart"),
         (lambda t: t.pop("world"), "world.drum: "),
-        (lambda t: t.update(models=[{**MODEL, "name": "b"}, MODEL]), "models: [{…}] → [{…}, {…}]: needs a restart"),
+        (lambda t: t.update(models=[{**MODEL, "name": "b"}, MODEL]), "models: 1 → 2 entries: needs a restart"),
     ],
 )
 def test_what_needs_a_restart_says_so_by_name(

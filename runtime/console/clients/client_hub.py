@@ -14,6 +14,7 @@ from runtime.console.clients.client import Client, Frame, Transport
 from runtime.console.clients.control import Control, Holder
 from runtime.console.http.client_limits import Limits
 from runtime.console.sent_messages import ClientRow, LogMessage, Role, RoleMessage
+from runtime.support.log_sentence import field_text
 
 if TYPE_CHECKING:
     from asyncio import AbstractEventLoop
@@ -143,7 +144,7 @@ class ClientHub:
                 self._loop.call_soon_threadsafe(self.on_log, dict(event))
             return
         known = ("level", "event", "timestamp")
-        fields = {name: str(value)[:TEXT_MAX] for name, value in event.items() if name not in known}
+        fields = {name: field_text(value)[:TEXT_MAX] for name, value in event.items() if name not in known}
         line: LogMessage = {
             "type": "log",
             "timestamp": str(event.get("timestamp", "")),

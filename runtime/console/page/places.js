@@ -31,6 +31,15 @@ const withCorners = (row, corners) =>
       ? { ...row, points_m: corners }
       : { ...row, vertices_m: corners };
 
+// Rows and those read that are none of them, whatever the order of their keys.
+/** @template {PlaceRow} Row @param {Row[]} rows @param {Row[]} read @returns {Row[]} */
+function withNew(rows, read) {
+  /** @param {Row} row */
+  const text = (row) => JSON.stringify(Object.entries(row).sort());
+  const known = new Set(rows.map(text));
+  return [...rows, ...read.filter((row) => !known.has(text(row)))];
+}
+
 /** @extends {Emitter<{ changed: [] }>} */
 export class Places extends Emitter {
   all = NONE;
@@ -126,7 +135,8 @@ export class Places extends Emitter {
     await this.connection.request({ type: "undo_places" }).catch(this.notifications.showError);
   }
 
-  // Adds all places of a map file to those that there are; one of the same name is replaced.
+  // Adds all places of a map file to those that there are; one of the same name is replaced, an equal line or area is
+  // not added again.
   /** @param {string} text */
   async load(text) {
     const read = await this.connection.request({ type: "read_places", text });
@@ -134,9 +144,9 @@ export class Places extends Emitter {
     const kept = { ...this.all, place: this.all.place.filter(({ name }) => !names.has(name)) };
     await this.#send({
       place: [...kept.place, ...read.place],
-      no_go_line: [...kept.no_go_line, ...read.no_go_line],
-      no_go_area: [...kept.no_go_area, ...read.no_go_area],
-      speed_area: [...kept.speed_area, ...read.speed_area],
+      no_go_line: withNew(kept.no_go_line, read.no_go_line),
+      no_go_area: withNew(kept.no_go_area, read.no_go_area),
+      speed_area: withNew(kept.speed_area, read.speed_area),
     });
   }
 

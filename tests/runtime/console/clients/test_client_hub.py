@@ -32,8 +32,9 @@ async def test_log_lines_also_reach_later_clients() -> None:
                         "fields": {"mode": "READY", "cycle": "3"}}  # fmt: skip
         later = await case.connect()
         assert await later.next("log") == line
-        await asyncio.to_thread(case.console.hub.on_log, {"event": "from a thread", "level": "warning"})
-        assert (await page.next("log"))["event"] == "from a thread"
+        await asyncio.to_thread(case.console.hub.on_log, {"event": "from a thread", "changed": ["a", "b"]})
+        line = await page.next("log")
+        assert (line["event"], line["fields"]) == ("from a thread", {"changed": "a, b"})
 
 
 class Slow:
