@@ -9,6 +9,7 @@ missing fails the tests: a page that was never opened is untested.
 from __future__ import annotations
 
 import shutil
+import socket
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
@@ -43,9 +44,17 @@ def hall() -> Hall:
     return Hall()
 
 
+@pytest.fixture(scope="session")
+def port() -> int:
+    """Return a port for one server after another: the browser keeps by it what it has loaded and compiled."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        number: int = free.getsockname()[1]
+    return number
+
+
 @pytest_asyncio.fixture(loop_scope="session")
-async def server(hall: Hall) -> AsyncIterator[FakeServer]:
-    async with serving(hall) as running:
+async def server(hall: Hall, port: int) -> AsyncIterator[FakeServer]:
+    async with serving(hall, port) as running:
         yield running
 
 

@@ -360,13 +360,14 @@ def _polar(x: float, y: float) -> tuple[float, float]:
 def _file(path: Path) -> web.Response:
     if not path.is_file():
         raise web.HTTPNotFound
-    headers = {"Content-Security-Policy": POLICY, "Cache-Control": "no-store"}
+    caching = "no-store" if path.suffix == ".html" else "max-age=3600, immutable"  # no test changes them
+    headers = {"Content-Security-Policy": POLICY, "Cache-Control": caching}
     return web.Response(body=path.read_bytes(), content_type=KINDS[path.suffix], charset="utf-8", headers=headers)
 
 
 @contextlib.asynccontextmanager
-async def serving(hall: Hall) -> AsyncIterator[FakeServer]:
-    """Serve a page of a hall on a free port."""
+async def serving(hall: Hall, port: int = 0) -> AsyncIterator[FakeServer]:
+    """Serve a page of a hall on a port, or on a free one where that has been taken meanwhile."""
     server = FakeServer(hall)
     app = web.Application()
     app.add_routes([
@@ -375,8 +376,10 @@ async def serving(hall: Hall) -> AsyncIterator[FakeServer]:
     ])  # fmt: skip
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=1.0)
     await runner.setup()
-    site = web.TCPSite(runner, "127.0.0.1", 0)
-    await site.start()
+    try:
+        await web.TCPSite(runner, "127.0.0.1", port, reuse_address=True).start()
+    except OSError:
+        await web.TCPSite(runner, "127.0.0.1", 0).start()
     server.port = runner.addresses[0][1]
     task = asyncio.create_task(server.run())
     try:

@@ -148,8 +148,8 @@ class Opened:
 class PagePool:
     """Pages that are used again by the next test: to make a page anew costs the browser two seconds of computing.
 
-    Their clocks stand still. What a page stores lies with its origin, and each server has a port of its own; a port
-    may come again, so the storage is cleared.
+    Their clocks stand still. What a page stores lies with its origin, which the next server may have again, so the
+    storage is cleared.
     """
 
     def __init__(self, browser: Browser) -> None:
