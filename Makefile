@@ -26,8 +26,10 @@ export UV_SYSTEM_CERTS ?= 1
 run: $(VENV)/run.stamp
 	@$(BIN)/echolocate run
 
-# All at once, so that no processor waits while one of them collects its tests; each of the others prints as it ends.
-test: $(VENV)/test.stamp
+# All at once, so that no processor waits while something is fetched, or one of them collects its tests; each of the
+# others prints as it ends.
+test:
+	@$(MAKE) --no-print-directory --silent --jobs=3 $(VENV)/test.stamp $(VENV)/npm.stamp $(VENV)/browser.stamp
 	@$(MAKE) --no-print-directory --jobs=3 compiled beside
 	@$(MAKE) --no-print-directory coverage
 
@@ -56,7 +58,7 @@ tests: compiled interpreted
 
 # All tests but those of `boundscheck`, and of `interpreted` alone (tests/inner_kernels.py). Many wait for the clock, so
 # there are twice as many at a time as processors.
-compiled: $(VENV)/test.stamp $(VENV)/browser.stamp
+compiled: $(VENV)/test.stamp $(VENV)/npm.stamp $(VENV)/browser.stamp
 	@rm -f $(LINES)/compiled-*
 	LINE_COVERAGE=$(LINES) $(PYTEST) --forks $$((2 * $(PROCESSORS))) -m "not soak and not boundscheck"
 
@@ -76,7 +78,7 @@ boundscheck: $(VENV)/test.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 $(PYTEST) $(BOUNDSCHECKED) -m "boundscheck and not soak"
 
 # Measures every promise and writes docs/promises.md. (The option needs its "=": pytest would take the page for a test.)
-promises: $(VENV)/test.stamp $(VENV)/browser.stamp
+promises: $(VENV)/test.stamp $(VENV)/npm.stamp $(VENV)/browser.stamp
 	$(BIN)/python -m pytest -q -m "promise and not soak" --promises=docs/promises.md
 
 # Long forms of tests, fuzzers, new random examples (`make tests` repeats the same ones), and 1.5 h of driving in virtual
@@ -165,7 +167,7 @@ $(VENV)/npm.stamp: .ci/page/package-lock.json | $(VENV)/bin/python
 		|| echo "npm is not installed, or reaches no registry: what needs its packages is skipped"
 	@touch $@
 
-$(VENV)/test.stamp: pyproject.toml | $(VENV)/bin/python $(VENV)/npm.stamp
+$(VENV)/test.stamp: pyproject.toml | $(VENV)/bin/python
 	$(call install,.[dev])
 
 $(VENV)/soak.stamp: pyproject.toml | $(VENV)/bin/python

@@ -34,6 +34,7 @@ COVERAGE = line_coverage.start()  # before any module of the product is imported
 
 from runtime.support import child_process  # noqa: E402
 from runtime.support.kernel_cache import use_kernel_cache  # noqa: E402
+from runtime.support.kernel_warmup import GARBAGE_MAX  # noqa: E402
 from tests import promise_page, promises  # noqa: E402
 from tests.compile_kernels import compile_all  # noqa: E402
 from tests.forked import ForkedTests  # noqa: E402
@@ -83,12 +84,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Let no collection of garbage visit what importing the tests makes: with a million objects each takes long."""
+    """Let no collection of garbage visit what importing the tests makes: with a million objects each takes long.
+
+    Later ones are as rare as where kernels are compiled, which the tests do first.
+    """
     gc.disable()
     try:
         return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(GARBAGE_MAX)
         gc.enable()
 
 
@@ -156,7 +161,7 @@ def _waits(item: pytest.Item) -> bool:
 def _load_kernels(session: pytest.Session) -> None:
     from tests.inner_kernels import runs_interpreted_alone  # imports numba, which reads its settings
 
-    compile_all()
+    compile_all(in_one_process=True)
     left = {item: None for item in session.items if runs_interpreted_alone(item)}
     session.items[:] = [item for item in session.items if item not in left]
     session.testscollected = len(session.items)  # of which the progress is a share
