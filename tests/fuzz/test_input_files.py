@@ -23,7 +23,7 @@ from tests.fuzz.hazards import HAZARDS
 from tests.fuzz.mutators import mutate
 
 ROOT = Path(__file__).parents[2]
-FILES = 250
+FILES = 150
 SOAK_FILES = 20_000
 """For each of the five kinds, 10⁵ in all."""
 MEMORY_MAX_MB = 500

@@ -32,7 +32,7 @@ def losses(trial: StandTrial) -> list[str]:
 @pytest.mark.parametrize(
     ("seed", "model"),
     [
-        *zip([2000, 2001], MODELS, strict=True),
+        (2000, "cone"),
         *(pytest.param(*both, marks=pytest.mark.soak) for both in itertools.product([2000, 2001, 2002], MODELS)),
     ],
 )
@@ -63,8 +63,8 @@ def test_the_last_readings_of_a_drive_take_no_wall_and_no_drum_away(seed: int, m
 @pytest.mark.parametrize(
     ("seed", "model"),
     [
-        *zip([2004, 2008], MODELS, strict=True),
-        *(pytest.param(*both, marks=pytest.mark.soak) for both in zip([2008, 2004], MODELS, strict=True)),
+        (2008, "specular"),
+        *(pytest.param(*both, marks=pytest.mark.soak) for both in itertools.product([2004, 2008], MODELS)),
     ],
 )
 def test_further_readings_of_an_unchanged_room_change_nothing(model: Reflection, seed: int) -> None:
