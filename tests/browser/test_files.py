@@ -45,6 +45,9 @@ async def test_a_recording_is_described_renamed_pinned_and_deleted(server: FakeS
     link = await page.locator("#file-download").get_attribute("href")
     assert link == f"/recording?file={FIRST}&token={TOKEN}"
 
+    await page.locator("#file-new-name").fill(" ")
+    await page.locator("#file-new-name").press("Enter")
+    await opened.says("#file-error", "a name is wanted")
     server.data["rename_recording"] = "dock.mcap"
     await page.locator("#file-new-name").fill("dock")
     await page.locator("#file-new-name").press("Enter")

@@ -200,13 +200,14 @@ export class Files extends Panel {
     event.preventDefault();
     const file = this.#chosen;
     if (file === null) return;
+    const to = byId("file-new-name").value.trim();
+    if (to === "") {
+      setText(byId("file-error"), "a name is wanted here");
+      return;
+    }
     let name;
     try {
-      name = await this.connection.request({
-        type: "rename_recording",
-        file,
-        to: byId("file-new-name").value.trim() || "?",
-      });
+      name = await this.connection.request({ type: "rename_recording", file, to });
     } catch (error) {
       setText(byId("file-error"), messageOf(error));
       return;
