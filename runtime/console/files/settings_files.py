@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import difflib
 import hashlib
 from collections.abc import Callable, Sequence
@@ -35,17 +36,27 @@ HEAD: Final = "The places of the map {}, kept for the next run with it (m)."
 class SettingsFiles:
     """The files that the settings of this run were read from.
 
-    `reload` reads the settings of the whole run again, and raises ConfigError where they are wrong; `restart` ends
-    the run and starts it again with the same command, or returns why it cannot.
+    `settings` are those with which the run began; `reload` reads those of the whole run again, and raises ConfigError
+    where they are wrong; `restart` ends the run and starts it again with the same command, or returns why it cannot.
     """
 
     def __init__(
-        self, documents: Sequence[DocumentRead], reload: Callable[[], Settings], restart: Callable[[], str | None]
+        self,
+        documents: Sequence[DocumentRead],
+        settings: Settings,
+        reload: Callable[[], Settings],
+        restart: Callable[[], str | None],
     ) -> None:
         self._documents = [one for one in documents if one.kind in KINDS]
         self._reload = reload
         self._restart = restart
         self._keeping = asyncio.Lock()
+        self._settings = settings
+        self._map: tuple[WorldConfig | None, DocumentRead | None] = (
+            settings.perception.localization.known_room,
+            None,
+        )
+        """A known room, and the file that had it when that was last looked at."""
 
     def listed(self) -> list[SettingsRow]:
         """Return the files, in the order in which they were read."""
@@ -116,30 +127,61 @@ class SettingsFiles:
     def _keep_places(self, settings: Settings) -> None:
         """Write the places in force to the file of the known room; those of a shipped room go to a file of their own.
 
-        Without a known room, or where no file has it, nothing is written. It blocks: call it in a thread.
+        Without a known room, or where it was loaded since, nothing is written. It blocks: call it in a thread.
 
         Raises
         ------
         CommandError
-            The file cannot be read or written.
+            The file cannot be read or written, or none has the room.
+        """
+        document = self._map_file(settings)
+        if document is None:
+            return
+        if document.path is None:
+            text = world_text(with_places(WorldConfig(), settings.places), (HEAD.format(document.name),))
+            self._put(document, kept_places(Path(document.name).stem), text)
+        else:
+            text, world = self._world(document)
+            if world.places() != settings.places:
+                self._put(document, document.path, text_with_places(text, settings.places))
+
+    def _map_file(self, settings: Settings) -> DocumentRead | None:
+        """Return the file that has the known room, or had it before it was edited; None if that was loaded since.
+
+        Raises
+        ------
+        CommandError
+            A file is no world any more, or none is known to have had the room.
         """
         room = settings.perception.localization.known_room
+        if room is None:
+            return None
         for document in reversed(self._documents):  # the map is read after the emulator's world
-            if room is None or document.kind != "worlds":
-                continue
-            text = self._read(document)["text"]
-            try:
-                world = parse_text(WorldConfig, text, document.name)
-                of_file = with_room(settings, world, document.name).perception.localization.known_room
-            except ConfigError as error:
-                raise CommandError(f"the places are in force, but not kept in {document.name}: {error}") from None
-            if of_file == room:
-                if document.path is None:
-                    text = world_text(with_places(WorldConfig(), settings.places), (HEAD.format(document.name),))
-                    self._put(document, kept_places(Path(document.name).stem), text)
-                elif world.places() != settings.places:
-                    self._put(document, document.path, text_with_places(text, settings.places))
-                return
+            if document.kind == "worlds":
+                _, world = self._world(document)
+                if with_room(settings, world, document.name).perception.localization.known_room == room:
+                    self._map = (room, document)
+                    return document
+        known, document_before = self._map
+        if room == known and document_before is None:
+            raise CommandError(
+                "the places are in force, but not kept: the map's file has changed since the run began; save the map"
+            )
+        return document_before if room == known else None
+
+    def _world(self, document: DocumentRead) -> tuple[str, WorldConfig]:
+        """Return a world file's text, and what it says.
+
+        Raises
+        ------
+        CommandError
+            It cannot be read, or is no world.
+        """
+        text = self._read(document)["text"]
+        try:
+            return text, parse_text(WorldConfig, text, document.name)
+        except ConfigError as error:
+            raise CommandError(f"the places are in force, but not kept in {document.name}: {error}") from None
 
     def _document(self, number: int) -> DocumentRead:
         """Return the file with this number in the list of pages.
@@ -208,6 +250,8 @@ class SettingsFiles:
             raise CommandError(f"{document.name} is not saved: {problems[0]['text']}")
         if "\r\n" in before["text"]:  # a page has plain line ends
             text = text.replace("\r\n", "\n").replace("\n", "\r\n")
+        with contextlib.suppress(CommandError):
+            self._map_file(self._settings)  # once its walls are others, it is not recognised
         self._put(document, document.path, text)
         return self._read(document)
 

@@ -86,7 +86,7 @@ async def serve_console(
             recording=recording,
             replay=replays,
             files=RecordingFiles(folder, current_file, jobs),
-            settings_files=SettingsFiles(documents_read(), reload, end_and_restart),
+            settings_files=SettingsFiles(documents_read(), process.live_settings.current, reload, end_and_restart),
         ),
     )
     try:

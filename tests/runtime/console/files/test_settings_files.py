@@ -28,8 +28,8 @@ class Run:
         self.restarts = 0
         self.refusal: str | None = None
         with noting_files_read():
-            self.load()
-            self.files = SettingsFiles(documents_read(), self.load, self._restart)
+            settings = self.load()
+            self.files = SettingsFiles(documents_read(), settings, self.load, self._restart)
 
     def load(self) -> Settings:
         return load_settings(self.config)
@@ -124,7 +124,7 @@ async def test_changed_places_are_kept_in_the_map_that_the_run_was_started_with(
         file.write_text(text)
     with noting_files_read():
         settings = with_known_room(load_settings("hallway", world=str(other)), str(path))
-        files = SettingsFiles(documents_read(), lambda: settings, lambda: None)
+        files = SettingsFiles(documents_read(), settings, lambda: settings, lambda: None)
     charger = PlacesConfig(place=(PlaceConfig(name="charger", x_m=1.0, y_m=2.0),))
     marked = settings.model_copy(update={"places": charger})
     await files.keep_places(marked)
@@ -140,6 +140,34 @@ async def test_changed_places_are_kept_in_the_map_that_the_run_was_started_with(
         await files.keep_places(marked)
 
 
+@pytest.mark.parametrize("by", ["page", "editor", "editor before"])
+async def test_places_are_kept_in_a_map_whose_walls_were_edited_since(tmp_path: Path, by: str) -> None:
+    """A page or an editor may change the walls, which count at the next start; the places are kept beside them."""
+    path = tmp_path / "map.toml"
+    path.write_text("[[wall]]\nx1_m = 0.0\ny1_m = 3.0\nx2_m = 4.0\ny2_m = 3.0\n")
+    with noting_files_read():
+        settings = with_known_room(load_settings("hallway"), str(path))
+        files = SettingsFiles(documents_read(), settings, lambda: settings, lambda: None)
+    marked = settings.model_copy(update={"places": PlacesConfig(place=(PlaceConfig(name="a", x_m=1.0, y_m=2.0),))})
+    number = len(files.listed()) - 1
+    held = await files.read(number)
+    edited = held["text"].replace("4.0", "5.0")
+    if by == "page":
+        await files.save(number, edited, held["digest"])
+    elif by == "editor":
+        await files.keep_places(marked)
+        await files.keep_places(settings)
+    if by != "page":
+        path.write_text(edited)
+    if by == "editor before":
+        with pytest.raises(CommandError, match="not kept"):
+            await files.keep_places(marked)
+        return
+    await files.keep_places(marked)
+    assert path.read_text().startswith(edited)
+    assert with_known_room(settings, str(path)).places == marked.places
+
+
 async def test_places_on_a_shipped_map_are_kept_for_the_next_run_with_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -147,7 +175,7 @@ async def test_places_on_a_shipped_map_are_kept_for_the_next_run_with_it(
     command = RunFiles(world="room", map_file="office")
     with noting_files_read():
         settings = command.read()
-        files = SettingsFiles(documents_read(), lambda: settings, lambda: None)
+        files = SettingsFiles(documents_read(), settings, lambda: settings, lambda: None)
     charger = PlacesConfig(place=(PlaceConfig(name="charger", x_m=1.0, y_m=2.0),))
     await files.keep_places(settings.model_copy(update={"places": charger}))
     assert command.read().places == charger

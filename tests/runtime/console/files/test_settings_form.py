@@ -157,8 +157,8 @@ async def test_a_packages_own_robot_file_is_read_and_not_changed(tmp_path: Path)
     run = Run(tmp_path)
     run.config.write_text('robot = "skippy"\nworld = "hallway"\n')
     with noting_files_read():
-        run.load()
-        files = SettingsFiles(documents_read(), run.load, lambda: None)
+        settings = run.load()
+        files = SettingsFiles(documents_read(), settings, run.load, lambda: None)
     number = next(n for n, row in enumerate(files.listed()) if row["name"] == "robots/skippy.toml")
     assert files.listed()[number]["shipped"]
     held = await files.read(number)
