@@ -18,6 +18,8 @@ from config.settings import Settings
 from perception.percept import Pose
 from runtime.support.pattern_check import oldest_percept
 
+SAME_RAD: Final = 1e-6
+"""Beams that overlap by less end side by side."""
 STEP_DEG: Final = 1
 """Step of the directions that are tried."""
 COURSE_DEG: Final = 2
@@ -26,6 +28,11 @@ STAND_DEG: Final = 180
 """A ring that hears less of a turn seldom finds itself at one stand: of 24 in known rooms three sensors of ±15° in
 front were right at none, five at 10, `hobby8` (224°) at 16, `amigo` (237°) at 20, `p3dx` (324°) at 24. After 12 m of
 way each was right in all of eight. Three sensors named no drum that they drove at (0 of 6), only what they passed."""
+MEETS_M: Final = 1.0
+"""Neighbouring beams that meet nearer before the rim hear an object before it comes between them; those of all
+shipped rings but the AmigoBot's meet within 0.7 m ahead."""
+AHEAD_RAD: Final = math.radians(60.0)
+"""A gap farther from straight ahead is beside the way."""
 SLOW_SHARE: Final = 0.99
 """A speed below this share of the base velocity is named."""
 
@@ -53,10 +60,10 @@ def blind_sides_deg(settings: Settings) -> list[tuple[int, int]]:
 
 
 def blind_notes(settings: Settings) -> list[str]:
-    """Return what the ring's blind sides forbid, one text each; none where it looks all round."""
-    sides = blind_sides_deg(settings)
+    """Return what the ring's blind sides and gaps cost, one text each; none where it looks all round."""
+    sides, gaps = blind_sides_deg(settings), _gap_notes(settings)
     if not sides:
-        return []
+        return gaps
     heard_deg = max(0, 360 - sum(end - begin + 1 for begin, end in sides))
     arbiter, body = settings.behaviors.arbiter, settings.body
     path_deg = math.degrees(path_half_angle_rad(body, arbiter.clearance_m))
@@ -85,7 +92,62 @@ def blind_notes(settings: Settings) -> list[str]:
             "it does not find itself before it has turned or driven, and it recognises an object once it has driven "
             "past or round it"
         )
-    return notes
+    return notes + gaps
+
+
+def _gap_notes(settings: Settings) -> list[str]:
+    """Return what gaps between neighbouring beams cost that look side by side and do not meet; at most one text.
+
+    Sensors on a rim whose beams end side by side leave a strip as wide as their distance, at any range.
+    """
+    half = math.radians(settings.ring.beam_half_angle_deg)
+    widest_m, meets_m = max(_gaps_m(settings, half), default=(0.0, 0.0), key=lambda gap: gap[1])
+    if meets_m <= MEETS_M:
+        return []
+    where = "at any range" if math.isinf(meets_m) else f"up to {meets_m:.1f} m ahead"
+    wider = (
+        deg
+        for deg in range(math.ceil(settings.ring.beam_half_angle_deg), 90)
+        if all(meets <= MEETS_M for _, meets in _gaps_m(settings, math.radians(deg)))
+    )
+    return [
+        f"ring: neighbouring beams leave a strip {widest_m:.2f} m wide between them, {where}: what is narrower, or a "
+        "post or drum that reflects like a mirror, is not heard there until the robot is beside it or touches it; "
+        f"beams of ±{next(wider, 90)}°, or sensors nearer to each other, close it"
+    ]
+
+
+def _gaps_m(settings: Settings, half_rad: float) -> list[tuple[float, float]]:
+    """Return width and range (from the rim) of the gap between each two neighbouring beams that end side by side, m.
+
+    Parameters
+    ----------
+    settings
+        The run's: its ring's mounts and the body's radius.
+    half_rad
+        Half of the beams' opening, rad.
+    """
+    mounts = sorted(settings.ring.mounts, key=lambda mount: mount[2] % math.tau)
+    gaps = []
+    for (x1, y1, a1), (x2, y2, a2) in zip(mounts, [*mounts[1:], *mounts[:1]], strict=True):
+        apart = (a2 - a1) % math.tau
+        overlap = 2.0 * half_rad - apart
+        middle = math.remainder(a1 + 0.5 * apart, math.tau)
+        is_ahead = settings.body.synchro or abs(middle) <= AHEAD_RAD
+        if overlap < -SAME_RAD or not is_ahead:
+            continue
+        edge, dx, dy = a1 + half_rad, x2 - x1, y2 - y1
+        width_m = math.cos(edge) * dy - math.sin(edge) * dx
+        if width_m <= 0.0:
+            continue
+        if overlap < SAME_RAD:
+            gaps.append((width_m, math.inf))
+            continue
+        other = a2 - half_rad
+        along_m = (dy * math.cos(other) - dx * math.sin(other)) / math.sin(overlap)
+        x_m, y_m = x1 + along_m * math.cos(edge), y1 + along_m * math.sin(edge)
+        gaps.append((width_m, math.hypot(x_m, y_m) - settings.body.radius_m))
+    return gaps
 
 
 def way_refusal(settings: Settings, course_rad: float | None) -> str | None:

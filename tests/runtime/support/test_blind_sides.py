@@ -13,6 +13,9 @@ from config.errors import UserError
 from config.load import load_settings
 from config.robot import SensorConfig
 from config.settings import Settings
+from config.world import AcousticsConfig, DrumConfig, WorldConfig
+from drivers.emulator.scene import compile_scene
+from drivers.emulator.sonar import Sonar
 from perception.percept import Pose
 from runtime.support.blind_sides import blind_notes, blind_sides_deg, refuse_blind_ways, way_refusal
 from runtime.support.pattern_check import oldest_percept
@@ -32,6 +35,24 @@ def robot(*angles_deg: float, half_deg: float = 12.0, synchro: bool = False) -> 
 
 def test_a_ring_that_looks_all_round_has_no_blind_side() -> None:
     assert blind_notes(robot(*np.arange(0.0, 360.0, 20.0).tolist())) == []
+
+
+@pytest.mark.parametrize("half_deg", [12.0, 16.0])
+def test_beams_that_end_side_by_side_leave_a_strip_in_which_a_mirroring_drum_is_not_heard(half_deg: float) -> None:
+    settings = robot(*np.arange(0.0, 360.0, 24.0).tolist(), half_deg=half_deg)
+    heard = False
+    for range_m in np.linspace(0.6, 2.0, 8).tolist():
+        x, y = range_m * math.cos(math.radians(12.0)), range_m * math.sin(math.radians(12.0))
+        scene = compile_scene(WorldConfig(drum=(DrumConfig(x_m=x, y_m=y, radius_m=0.2),)))
+        sonar = Sonar(settings.ring, scene, AcousticsConfig(model="specular"), np.random.default_rng(0))
+        heard |= bool(np.isfinite(sonar.fire(Pose(0.0, 0.0, 0.0), 0.0, range(15))).any())
+    notes = blind_notes(settings)
+    assert heard == (half_deg > 12.0)
+    assert [note for note in notes if "strip" in note] == ([] if heard else notes)
+    if not heard:
+        chord_m = 2.0 * 0.2 * math.sin(math.radians(12.0))
+        assert f"a strip {chord_m:.2f} m wide between them, at any range" in notes[0]
+        assert "beams of ±15°" in notes[0]
 
 
 def test_four_sensors_in_front_are_blind_behind_and_do_not_back() -> None:
