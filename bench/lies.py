@@ -34,6 +34,7 @@ from runtime.cycle.drive_requests import first_request, needs_recognition
 from runtime.cycle.echo_watch import NOTHING_NEW, NOTHING_YET
 from runtime.cycle.inputs import OperatorInput, Request, gather_inputs
 from runtime.cycle.modes import Mode
+from runtime.cycle.mounting_limit import DOUBTED
 from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import apply_command, step
 from runtime.cycle.unheard_limit import LOST, UNHEARD
@@ -313,7 +314,11 @@ def run_trial(
             if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and not str(state.mode.reason).startswith(BUMPER):
                 texts.append(str(state.mode.reason))
             held = held if state.hold_reason == held else None
-            if kind is not None and held is None and state.hold_reason in {LOST, NOTHING_NEW, NOTHING_YET, UNHEARD}:
+            if (
+                kind is not None
+                and held is None
+                and state.hold_reason in {DOUBTED, LOST, NOTHING_NEW, NOTHING_YET, UNHEARD}
+            ):
                 texts.append(str(state.hold_reason))
             if texts:
                 named_s, said = run_s - begin_s, texts[-1]

@@ -33,12 +33,12 @@ import numpy as np
 from config.robot import RingConfig
 from drivers.messages import Firing
 from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, POSITIVE, bounds, index_of
+from perception.kernel import Floats
 from perception.records import records, zeros
 from perception.ring_faults.changes import EXCHANGED, LENGTHENED, Expected
-from perception.ring_faults.memory import EchoTrace, RingTrace
+from perception.ring_faults.memory import EVIDENCE_NAT, QUARTERS, EchoTrace, RingTrace
 from perception.ring_faults.motion_tests import (
     CHANGED,
-    EVIDENCE_NAT,
     NOTHING,
     REPEATED,
     SCATTERED,
@@ -47,6 +47,7 @@ from perception.ring_faults.motion_tests import (
     VANISHED,
     check_motion,
 )
+from perception.ring_faults.mounting import DOUBTED_NAT, EXCLUDED_NAT, possible_places
 from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS, PastLooks
 from perception.ring_faults.wiring import LOOK_FIELDS, LOOKS, SENSORS_MAX, Wiring, weigh_turn, weigh_wiring
 from perception.sensor_faults.monitor import TOLERANCE_MIN_M, TOLERANCE_STEPS
@@ -132,6 +133,7 @@ class RingMonitor:
         "_wiring",
         "_near",
         "_turn_nat",
+        "_places",
     )
     """Not part of a snapshot: views of arrays that are, or overwritten before each use."""
     BOUNDS: Final = bounds(
@@ -139,6 +141,7 @@ class RingMonitor:
         _turning=CONSTANT,
         _turns=CONSTANT,
         _half_angle=CONSTANT,
+        _on_servo=CONSTANT,
         _tolerance=CONSTANT,
         _reach_m=CONSTANT,
         _past=PLACE,
@@ -158,6 +161,7 @@ class RingMonitor:
         self._turning = np.isin(np.arange(len(ring.mounts)), ring.turning)
         self._turns = bool(ring.turning)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
+        self._on_servo = ring.has_servo
         self._tolerance = max(TOLERANCE_STEPS * ring.resolution_m, TOLERANCE_MIN_M)
         self._reach_m = ring.window_m
         self._echoes = zeros(EchoTrace, len(ring.mounts))
@@ -176,6 +180,7 @@ class RingMonitor:
         self._wiring = Wiring(self._turned_looks, self._turned_counts, self._exchanged_nat)
         self._near = np.zeros((wired * LOOKS, 3))
         self._turn_nat = np.zeros((wired, wired + 1))
+        self._places = np.zeros((len(ring.mounts) * QUARTERS, 2))
         self._found = NOTHING
 
     def observe(self, firing: Firing) -> int | None:
@@ -228,6 +233,22 @@ class RingMonitor:
             i, j = divmod(found - WIRED, n)
             return deaf_reason(j) if i == n else wiring_reason(i, j)
         return None if found == NOTHING else REASONS[found]
+
+    def possible_obstacles(self) -> Floats:
+        """Return where the last echoes came from if the ring is turned, as far as that is not excluded: (k, 2), m.
+
+        One sensor on a servo looks in each direction too seldom to exclude it, and nothing is returned.
+        """
+        if self._on_servo:
+            return self._places[:0]
+        mounts = self._turned if self._turns else self._mounts
+        return self._places[: possible_places(mounts, self._echo_records, self._ring_records, self._places)]
+
+    @property
+    def is_doubted(self) -> bool:
+        """Whether a mounting that is not excluded explains the readings better than the robot file does."""
+        ring = self._ring[0]
+        return bool(((ring["excluded_nat"] < EXCLUDED_NAT) & (ring["turned_nat"] >= DOUBTED_NAT)).any())
 
     def set_reach(self, reach_m: float) -> None:
         """Expect echoes up to another range, m."""

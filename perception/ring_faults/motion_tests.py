@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.records import Records
 from perception.ring_faults.changes import (
@@ -23,8 +22,10 @@ from perception.ring_faults.changes import (
     weigh_changes,
 )
 from perception.ring_faults.memory import (
+    EVIDENCE_NAT,
     HALVES,
     LOOK_KINDS,
+    MOVES,
     NO_ECHO_M,
     QUARTERS,
     EchoTrace,
@@ -33,20 +34,16 @@ from perception.ring_faults.memory import (
     RingTrace,
     mark,
 )
+from perception.ring_faults.mounting import weigh_change
 from perception.ring_faults.repeats import (
-    STEP_MIN_M,
-    is_parallel_wall,
     learn_noise,
     repeat_evidence,
     weigh_repeat,
 )
 from perception.ring_faults.replays import PAST_LOOKS, PastLooks, weigh_replay
-from perception.sensor_faults.wall import NOISE_SHARE, fits_unseen_wall
+from perception.sensor_faults.wall import NOISE_SHARE
 from perception.sensor_mounts import RingPose
 
-EVIDENCE_NAT: Final = math.log(1e7 / 0.002)
-"""A sum of evidence that convicts the ring, nat: a day has some 10⁷ readings, and at most two days in a
-thousand are to have a false alarm. In 40 hours of simulated honest drives the greatest sum was 19.5."""
 CHANGE_NAT: Final = math.log(3e5 / 0.002)
 """The same for changes from one round of the firing pattern to the next, of which a day has some 3·10⁵, nat."""
 REPLAY_NAT: Final = EVIDENCE_NAT + math.log(PAST_LOOKS)
@@ -60,8 +57,6 @@ LEADS_M: Final = 0.5
 """A known echo leads to expect the next one within this way of the ring, m."""
 REACH_SHARE: Final = 0.8
 """What is expected beyond this share of the ring's reach may be out of reach next time."""
-MOVES: Final = 1.2
-"""A reading changes by no more than this times the sensor's motion; rough walls that the beam grazes change more."""
 MISSED: Final = 0.9
 """Share of looks that miss a known echo, if readings do not depend on what is there."""
 HONEST_MISS_MIN: Final = 0.04
@@ -81,14 +76,6 @@ HONEST_LOOKS: Final = 20.0
 """Looks that stand for what is known of rings before a run."""
 MEMORY_LOOKS: Final = 500.0
 """Looks over which the rates of misses are learned; older ones count half."""
-
-FOLLOWS: Final = 0.7
-"""Share of an honest ring's changes that follow the motion; the others come from surfaces that change places."""
-ALIKE: Final = 2.5
-"""Changes in succession of one surface's range that count as one: oblique rough walls deceive all of them alike.
-Beams that overlap are counted apart."""
-LEAN_RAD: Final = 0.15
-"""A wall that leans to the path by up to this changes the ranges of sensors that graze it as nothing else does."""
 
 NOTHING, REPEATED, VANISHED, SCATTERED, TURNED = range(5)
 """What `check_motion` returns: nothing is wrong; the ring repeats old readings; most known echoes have gone
@@ -206,68 +193,6 @@ def keep_echo(c: EchoTrace, look: Look, agrees: bool, path_m: float) -> None:
         c.is_anchored = 1 if c.is_anchored and c.agreed > 0 else 0
         c.silences = 0
         mark(c.heard, r, x, y, axis, path_m)
-
-
-@kernel
-def weigh_change(
-    i: int,
-    look: Look,
-    yaw: float,
-    mounts: Floats,
-    reception: Reception,
-    echoes: Records[EchoTrace],
-    all_of: RingTrace,
-) -> None:
-    """Test whether the change of an echo's range follows the motion, or that of a ring that is turned.
-
-    A surface whose normal lies in the beam comes nearer by d·cos ψ, for an angle ψ from the motion to a direction in
-    the beam. A rough one that the beam grazes may change otherwise, hence `FOLLOWS`; a rough wall along the path
-    says nothing, nor what may be one where no sensor sees it. Sensors whose beams overlap hear the same surface, and
-    together count as one. How a ring is mounted does not change on the way, so evidence for the robot file counts,
-    too: this sum may fall below zero.
-
-    Parameters
-    ----------
-    i : int
-        The sensor.
-    look, reception, all_of
-        As for `weigh_look`; the look has an echo.
-    yaw, mounts, echoes
-        As for `check_motion`.
-    """
-    c = echoes[i]
-    r, x, y, axis = look
-    half_angle, tolerance, _ = reception
-    if not c.is_anchored or abs(axis - c.anchor.axis) > 0.5 * half_angle:
-        c.is_anchored = 1
-        mark(c.anchor, r, x, y, axis, all_of.path_m)
-        return
-    if r == c.anchor.range_m and c.standstill == all_of.standstill:  # frozen looks as if it were turned
-        return
-    dx, dy = x - c.anchor.x, y - c.anchor.y
-    moved = math.hypot(dx, dy)
-    if moved < 2.0 * max(STEP_MIN_M, 3.0 * tolerance):
-        return
-    change, error, path = r - c.anchor.range_m, tolerance + 0.03 * r, math.atan2(dy, dx)
-    is_grazed = fits_unseen_wall(
-        wrapped(axis - path), change, moved, wrapped(yaw - path), mounts, half_angle, (error, LEAN_RAD)
-    )
-    if is_grazed or is_parallel_wall(i, r, (dx, dy), yaw, mounts, reception, LEAN_RAD, echoes, all_of.path_m):
-        mark(c.anchor, r, x, y, axis, all_of.path_m)
-        return
-    elsewhere = (1.0 - FOLLOWS) / (2.0 * (MOVES * moved + error))
-    mounted = 0.0
-    for quarter in range(QUARTERS + 1):
-        angle = abs(wrapped(axis + 0.5 * math.pi * quarter - path))
-        most = -moved * math.cos(max(0.0, angle - half_angle)) - error
-        least = -moved * math.cos(min(math.pi, angle + half_angle)) + error
-        density = elsewhere + (FOLLOWS / (least - most) if most <= change <= least else 0.0)
-        if quarter == 0:
-            mounted = density
-        else:
-            evidence = math.log(density / mounted) / (ALIKE * max(1.0, len(echoes) * half_angle / math.pi))
-            all_of.turned_nat[quarter - 1] = max(-EVIDENCE_NAT, all_of.turned_nat[quarter - 1] + evidence)
-    mark(c.anchor, r, x, y, axis, all_of.path_m)
 
 
 @kernel

@@ -8,7 +8,7 @@ of the callables give the same record, bit for bit; replay relies on that.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Annotated, Literal, TypeAlias
 
@@ -51,6 +51,7 @@ from runtime.cycle.inputs import Inputs
 from runtime.cycle.line_messages import blind_reason, unseen_reason
 from runtime.cycle.modes import ARMING_MAX_S, Mode, ModeState, advance
 from runtime.cycle.motion_monitor import MotionMonitor, Movement
+from runtime.cycle.mounting_limit import limit_by_mounting
 from runtime.cycle.stalled_drives import DriveMemory
 from runtime.cycle.start_turn import StartTurn
 from runtime.cycle.unheard_limit import limit_unheard, lost_ahead
@@ -339,11 +340,8 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     objects = state.perception.labelled_objects() if needs_objects(state.drive_request) else ()
     percept = Percept(odometry.pose, obstacles, view, objects)
     if needs_space(state.drive_request):
-        percept = Percept(
-            odometry.pose,
-            obstacles,
-            view,
-            objects,
+        percept = replace(
+            percept,
             occupancy=state.perception.occupancy(),
             canyons=state.perception.canyons(),
             steady=state.perception.steady_obstacles(now_s, age_max_s, odometry.pose),
@@ -363,6 +361,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
     if isinstance(decision, Drive):
         slow_reason = state.echo_watch.slow_reason(settings.ring.range_max_m)
         twist, slowed = limit_unheard(decision.twist, percept, unheard, settings, slow_reason)
+        twist, slowed = limit_by_mounting(twist, slowed, odometry.pose, state.perception.ring_monitor, settings)
         if zones is not None:
             commands, age_s = state.motion_monitor.commands, max(0.0, now_s - odometry.robot_s)
             last = commands[-1].twist if commands else STANDSTILL

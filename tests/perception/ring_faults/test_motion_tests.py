@@ -10,10 +10,9 @@ import pytest
 from perception.kernel import Floats
 from perception.records import records, zeros
 from perception.ring_faults.changes import EXCHANGED, LENGTHENED, Expected
-from perception.ring_faults.memory import EchoTrace, RingTrace
+from perception.ring_faults.memory import EVIDENCE_NAT, EchoTrace, RingTrace
 from perception.ring_faults.motion_tests import (
     CHANGED,
-    EVIDENCE_NAT,
     NOTHING,
     REPEATED,
     SCATTERED,

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from perception.records import Records, records, zeros
-from perception.ring_faults.memory import NO_ECHO_M, EchoTrace, RingTrace, mark
-from perception.ring_faults.motion_tests import EVIDENCE_NAT
+from perception.ring_faults.memory import EVIDENCE_NAT, NO_ECHO_M, EchoTrace, RingTrace, mark
 from perception.ring_faults.repeats import (
     EQUAL_NAT,
     EQUAL_PRIOR,

@@ -1,0 +1,161 @@
+"""The kernel that weighs how a ring is mounted: as the robot file says, or turned by a quarter, two or three.
+
+The range of an echo changes with the motion of its sensor. It is compared with what each mounting lets expect, and
+the logarithms of the likelihood ratios are summed in two ways:
+
+- *Turned*: evidence that the ring is turned, in which nothing counts that a wall along the path may explain. It slows
+  the robot down, and then stops it.
+- *Excluded*: evidence since the start against each of the turned mountings. A wall along the path explains a range
+  that stays, if the ring is mounted so that one may be there. A turned mounting that is not yet excluded limits the
+  speed beside what would then be ahead (`runtime.cycle.mounting_limit`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from perception.angles import wrapped
+from perception.kernel import Floats, kernel
+from perception.records import Records
+from perception.ring_faults.memory import (
+    EVIDENCE_NAT,
+    MOVES,
+    QUARTERS,
+    EchoTrace,
+    Look,
+    Reception,
+    RingTrace,
+    mark,
+)
+from perception.ring_faults.repeats import STEP_MIN_M, is_parallel_wall
+from perception.sensor_faults.wall import fits_unseen_wall
+
+EXCLUDED_NAT: Final = math.log(20.0)
+"""Evidence that excludes a mounting, nat: of twenty rings that are turned, at most one is taken for well mounted."""
+DOUBTED_NAT: Final = math.log(20.0)
+"""Evidence for a turned mounting, nat, with which the robot drives slowly until more of it decides."""
+ECHO_KEPT_M: Final = 0.5
+"""Way of the ring for which an echo is kept as what may be ahead, m."""
+FOLLOWS: Final = 0.7
+"""Share of an honest ring's changes that follow the motion; the others come from surfaces that change places."""
+ALIKE: Final = 2.5
+"""Changes in succession of one surface's range that count as one: oblique rough walls deceive all of them alike.
+Beams that overlap are counted apart."""
+LEAN_RAD: Final = 0.25
+"""A wall that leans to the path by up to this changes the ranges of sensors that graze it as nothing else does, rad:
+an honest `p3dx` that winds by ±13° between rough walls gathers .4 nat a metre against it; with .15 rad 1.3."""
+TURNED_SHARE: Final = 0.5
+"""Echoes are compared while the sensor has turned by no more than this share of half its beam."""
+STRAIGHT_SHARE: Final = 0.2
+"""The same for evidence that stops the robot."""
+
+
+@kernel
+def weigh_change(
+    i: int,
+    look: Look,
+    yaw: float,
+    mounts: Floats,
+    reception: Reception,
+    echoes: Records[EchoTrace],
+    all_of: RingTrace,
+) -> None:
+    """Test whether the change of an echo's range follows the motion, or that of a ring that is turned.
+
+    A surface whose normal lies in the beam comes nearer by d·cos ψ, for an angle ψ from the motion to a direction in
+    the beam. A rough one that the beam grazes may change otherwise, hence `FOLLOWS`; a rough wall along the path
+    says nothing, nor what may be one where no sensor sees it. Sensors whose beams overlap hear the same surface, and
+    together count as one. How a ring is mounted does not change on the way, so evidence for the robot file counts,
+    too: both sums may fall below zero.
+
+    Parameters
+    ----------
+    i : int
+        The sensor.
+    look, reception, all_of
+        As for `motion_tests.weigh_look`; the look has an echo.
+    yaw, mounts, echoes
+        As for `motion_tests.check_motion`.
+    """
+    c = echoes[i]
+    r, x, y, axis = look
+    half_angle, tolerance, _ = reception
+    turned = abs(axis - c.anchor.axis)
+    if not c.is_anchored or turned > TURNED_SHARE * half_angle:
+        c.is_anchored = 1
+        mark(c.anchor, r, x, y, axis, all_of.path_m)
+        return
+    if r == c.anchor.range_m and c.standstill == all_of.standstill:  # frozen looks as if it were turned
+        return
+    dx, dy = x - c.anchor.x, y - c.anchor.y
+    moved = math.hypot(dx, dy)
+    if moved < 2.0 * max(STEP_MIN_M, 3.0 * tolerance):
+        return
+    change, path = r - c.anchor.range_m, math.atan2(dy, dx)
+    error = tolerance + 0.03 * r + r * turned
+    norm = ALIKE * max(1.0, len(echoes) * half_angle / math.pi)
+    anything = 1.0 / (2.0 * (MOVES * moved + error))
+    filed, is_wall = 0.0, False
+    for quarter in range(QUARTERS + 1):
+        if quarter > 0 and is_wall and all_of.excluded_nat[quarter - 1] >= EXCLUDED_NAT:
+            continue
+        own, ring = axis + 0.5 * math.pi * quarter, yaw + 0.5 * math.pi * quarter
+        angle = abs(wrapped(own - path))
+        most = -moved * math.cos(max(0.0, angle - half_angle)) - error
+        least = -moved * math.cos(min(math.pi, angle + half_angle)) + error
+        density = (1.0 - FOLLOWS) * anything + (FOLLOWS / (least - most) if most <= change <= least else 0.0)
+        may_stay = density
+        if quarter == 0 or all_of.excluded_nat[quarter - 1] < EXCLUDED_NAT:
+            grazes = fits_unseen_wall(
+                wrapped(own - path), change, moved, wrapped(ring - path), mounts, half_angle, (error, LEAN_RAD)
+            ) or is_parallel_wall(i, r, (dx, dy), ring, mounts, reception, LEAN_RAD, echoes, all_of.path_m)
+            if grazes:
+                may_stay = max(density, anything)
+                is_wall = is_wall or quarter == 0
+        if quarter == 0:
+            filed, filed_stays = density, may_stay
+            continue
+        k = quarter - 1
+        if not is_wall and turned <= STRAIGHT_SHARE * half_angle:
+            evidence = math.log(density / filed) / norm
+            all_of.turned_nat[k] = max(-EVIDENCE_NAT, all_of.turned_nat[k] + evidence)
+        if all_of.excluded_nat[k] < EXCLUDED_NAT:
+            evidence = math.log(filed_stays / may_stay) / norm
+            all_of.excluded_nat[k] = max(-EVIDENCE_NAT, all_of.excluded_nat[k] + evidence)
+    mark(c.anchor, r, x, y, axis, all_of.path_m)
+
+
+@kernel
+def possible_places(mounts: Floats, echoes: Records[EchoTrace], ring: Records[RingTrace], places: Floats) -> int:
+    """Enter the places of the last echoes as each turned mounting has them that is not excluded; return how many.
+
+    A silence does not remove an echo: a ring that is turned comes nearer to what it seems to leave behind.
+
+    Parameters
+    ----------
+    mounts, echoes
+        As for `motion_tests.check_motion`.
+    ring : (1,) record
+        What is remembered of the ring.
+    places : (n · QUARTERS, 2) float
+        The first ones are the places x, y, m. Overwritten.
+    """
+    all_of, count = ring[0], 0
+    for quarter in range(1, QUARTERS + 1):
+        if all_of.excluded_nat[quarter - 1] >= EXCLUDED_NAT:
+            continue
+        c, s = math.cos(0.5 * math.pi * quarter), math.sin(0.5 * math.pi * quarter)
+        for i in range(len(echoes)):
+            heard = echoes[i].heard
+            if heard.range_m < 0.0 or not echoes[i].is_known or all_of.path_m - heard.path_m > ECHO_KEPT_M:
+                continue
+            yaw = heard.axis - mounts[i, 2]
+            dx = math.cos(yaw) * mounts[i, 0] - math.sin(yaw) * mounts[i, 1]
+            dy = math.sin(yaw) * mounts[i, 0] + math.cos(yaw) * mounts[i, 1]
+            x, y = heard.x - dx, heard.y - dy  # the ring's centre
+            dx += heard.range_m * math.cos(heard.axis)
+            dy += heard.range_m * math.sin(heard.axis)
+            places[count, 0], places[count, 1] = x + c * dx - s * dy, y + s * dx + c * dy
+            count += 1
+    return count
