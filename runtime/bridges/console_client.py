@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
@@ -221,6 +222,14 @@ class ConsoleClient:
         self._arrived.set()
 
 
+def _why(error: Exception) -> str:
+    """Return why there is no connection, as the system says it."""
+    cause = error.os_error if isinstance(error, aiohttp.ClientConnectorError) else error
+    if isinstance(cause, OSError) and cause.errno is not None and cause.errno > 0:
+        return os.strerror(cause.errno)  # asyncio's own text repeats the address
+    return getattr(cause, "strerror", None) or str(error) or "no answer"
+
+
 @asynccontextmanager
 async def connect(url: str) -> AsyncIterator[ConsoleClient]:
     """Connect to a run and yield the client; disconnect at the end.
@@ -245,9 +254,8 @@ async def connect(url: str) -> AsyncIterator[ConsoleClient]:
             text = _REFUSED.get(error.status, f"it answers with HTTP status {error.status}; is it echolocate?")
             raise ConsoleError(f"{address.origin()}: {text}") from error
         except (aiohttp.ClientError, OSError, TimeoutError) as error:
-            raise ConsoleError(
-                f"no run answers on {address.origin()} ({error}); start `echolocate run`, or correct the address"
-            ) from error
+            why = f"no run answers on {address.origin()} ({_why(error)})"
+            raise ConsoleError(f"{why}; start `echolocate run`, or correct the address") from error
         client = ConsoleClient(socket)
         receiving = asyncio.create_task(client.receive(), name="console client")
         try:

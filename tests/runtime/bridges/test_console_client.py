@@ -74,7 +74,10 @@ async def test_a_second_client_watches_asks_for_control_and_gets_it() -> None:
         (lambda url: url[:-3] + "xyz", "refuses the token"),
         (lambda url: url.replace("http:", "ftp:"), "no address of a run"),
         (lambda _: "not a url", "no address of a run"),
-        (lambda _: "http://127.0.0.1:9/?token=x", "no run answers on http://127.0.0.1:9 "),
+        (
+            lambda _: "http://127.0.0.1:9/?token=x",
+            r"no run answers on http://127.0.0.1:9 \(Connection refused\); start",
+        ),
     ],
 )
 async def test_why_a_client_cannot_connect_is_one_line(change: Any, message: str) -> None:
