@@ -29,7 +29,7 @@ class Session(ABC, Generic[S]):
     heard
         The bytes of the line in place of the robot's frames.
     is_other_robot
-        Whether the robot has said that it is another one than its file describes.
+        Whether what the robot says of itself is not what its file describes, so that another file may be its own.
     """
 
     def __init__(self, stamper: S, silence_max_s: float = math.inf) -> None:
@@ -120,6 +120,7 @@ class Session(ABC, Generic[S]):
         self.line_closed()
         self._odometry_gaps.begin()
         self.heard.clear()
+        self.is_other_robot = False
         self._run_s = run_s
 
     @abstractmethod

@@ -265,7 +265,7 @@ class ArcosDriver(Session[PoseStamper]):
     def _refuse(self, problem: str, *farewell: Command) -> None:
         self._go_down(problem)
         self._queue += farewell
-        self._has_session = False
+        self._has_session, self.is_other_robot = False, True
         self._refused_until_s = self._run_s + _REFUSED_S
 
     def _take(self, packet: Packet) -> None:
@@ -294,7 +294,6 @@ class ArcosDriver(Session[PoseStamper]):
         if handshake.stage is Stage.CONFIG and handshake.name is not None:
             wrong = diagnostics.wrong_robot(handshake.name, self._config)
             if wrong is not None:
-                self.is_other_robot = True
                 self._refuse(wrong)
         elif handshake.stage is Stage.DONE and not self._is_set_up:
             self._set_up()

@@ -365,7 +365,7 @@ class RflexDriver(Session[Measurements]):
         config = self._config
         wrong = line_diagnostics.deadman_refused(config.rflex.name, config.rflex.fail_safe_s, config.link)
         if wrong is not None:
-            self._state, self._problem = LineState.DOWN, wrong
+            self._state, self._problem, self.is_other_robot = LineState.DOWN, wrong, True
             return
         radius_m = max(math.hypot(mount.x_m, mount.y_m) for mount in config.ring.mounts)
         name, count, deadman_s = config.rflex.name, len(config.ring.mounts), config.rflex.fail_safe_s

@@ -128,6 +128,7 @@ def test_another_robot_than_expected_is_not_driven(ident: Ident, text: str) -> N
     harness.open()
     harness.answer()
     assert harness.state() is LineState.DOWN
+    assert harness.robot.is_other_robot
     with pytest.raises(AssertionError, match=text):
         raise AssertionError(harness.robot.problem)
     harness.robot.drive(Twist(0.1, 0.0))

@@ -26,6 +26,7 @@ from drivers.rflex.codec import (
     sonar_run,
 )
 from drivers.rflex.wire_units import drive_commands
+from drivers.session import Session
 from tests.drivers.contract.families import RFLEX
 from tests.drivers.device_host import script
 
@@ -98,10 +99,11 @@ def test_the_fail_safe_is_what_the_robot_file_says_and_must_suit() -> None:
     assert diagnostics.fail_safe(1.0) in cable.notes
     slow = RFLEX.robot.model_copy(update={"rflex": RFLEX.robot.rflex.model_copy(update={"fail_safe_s": 5.0})})
     driver = make_driver(slow)
+    assert isinstance(driver, Session)
     cable.driver = driver
     cable.plug()
     cable.run(0.5)
-    assert driver.state is LineState.DOWN
+    assert (driver.state, driver.is_other_robot) == (LineState.DOWN, True)
     assert "5 s" in (driver.problem or "")
 
 
