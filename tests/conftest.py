@@ -213,6 +213,7 @@ def _state_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
 
 
 @pytest.fixture(scope="session")
-def warm_kernels() -> None:
+def warm_kernels(request: pytest.FixtureRequest) -> None:
     """Compile every kernel before times are measured, also for processes that a test starts."""
-    compile_all()
+    if not request.config.option.forks:  # else this process was forked from one that has them
+        compile_all()

@@ -111,7 +111,7 @@ def worst_gap_m(seed: int, cycles: int = 400) -> float:
     return least
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_no_velocity_leads_into_a_zone(seed: int) -> None:
     assert worst_gap_m(seed) > 0.0
 
@@ -156,7 +156,7 @@ def test_the_work_of_a_cycle_is_bounded_by_the_sides_that_are_near(
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("seed", range(4, 312))
+@pytest.mark.parametrize("seed", range(2, 312))
 def test_no_velocity_leads_into_a_zone_in_many_drives(seed: int) -> None:
     assert worst_gap_m(seed) > 0.0
 

@@ -86,7 +86,9 @@ def test_columns_that_are_exchanged_are_found_and_others_are_not(robot: str, mod
         assert (found.sensors == order).mean() > 0.6
 
 
-@pytest.mark.parametrize(("robot", "column"), [("amigo", 2), ("amigo", 5), ("p3dx", 9)])
+@pytest.mark.parametrize(
+    ("robot", "column"), [("amigo", 2), ("amigo", 5), pytest.param("p3dx", 9, marks=pytest.mark.soak)]
+)
 def test_two_neighbours_that_are_exchanged_are_found_in_a_hall_of_drums(robot: str, column: int) -> None:
     """One of the two may fit as well in the other's place; both together do not."""
     drive = make_drive(109, robot, "hall", "cone", 150.0)

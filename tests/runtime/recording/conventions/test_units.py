@@ -207,7 +207,7 @@ def test_leaps_of_the_odometry_are_no_unit() -> None:
     assert list(converted_firings(leaps, LOG, ROBOT, AUTO, lambda _: None)) == leaps
 
 
-@pytest.mark.parametrize("count", [300, 450])
+@pytest.mark.parametrize("count", [300, pytest.param(450, marks=pytest.mark.soak)])
 @pytest.mark.parametrize(
     ("change", "option"),
     [
