@@ -33,7 +33,7 @@ def test_a_goal_is_approached_and_the_robot_stands_there() -> None:
     assert (to_goal.x, to_goal.y) == pytest.approx((0.0, 1.0))
     assert script.move_to(Pose(0.0, 1.0, math.pi / 2)).command == near(0.3, 0.0)
     speeds = []
-    for y in (4.3, 4.5, 4.7):
+    for y in (4.1, 4.4, 4.7):  # farther apart than the ring compares its echoes: those of this robot do not change
         command = script.move_to(Pose(0.0, y, math.pi / 2)).command
         assert isinstance(command, Twist)
         speeds.append(command.v)
