@@ -119,7 +119,7 @@ class Console:
         self._challenge_timer: asyncio.TimerHandle | None = None
         self._mode = run.state.mode
         """Of the last cycle."""
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks: set[asyncio.Task[Any]] = set()
         """Asynchronous commands under way."""
         self._server: Server | None = None
         self.url, self.token = "", ""
@@ -190,8 +190,10 @@ class Console:
                 "the console accepts other machines: anyone with the token can drive, and nothing is encrypted"
             )
         self._publisher.open()
-        # Made while the robot is being connected, or the first command would wait for it.
-        asyncio.get_running_loop().run_in_executor(None, reader)
+        # Made while the robot is being connected, or the first command would wait for it; no cycle waits for it.
+        making = asyncio.create_task(self._run.in_thread(reader), name="reader of commands")
+        self._tasks.add(making)
+        making.add_done_callback(self._tasks.discard)
         self._challenge()
         self._run.health.watch("console", self.probe)
         try:

@@ -27,6 +27,7 @@ from runtime.cycle.inputs import Request
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.step import State
 from runtime.support.health import Health
+from runtime.support.kernel_loader import InThread
 from runtime.timing.time_control import TimeControl
 from runtime.timing.timing_monitor import TimingMonitor
 
@@ -64,6 +65,10 @@ class Run(Robot, Protocol):
 
     def stop(self) -> None:
         """End the run in order: the robot halts first."""
+
+    @property
+    def in_thread(self) -> InThread:
+        """Calls a function in a thread that rests while a cycle is due."""
 
     @property
     def timing_monitor(self) -> TimingMonitor:

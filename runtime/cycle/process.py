@@ -106,6 +106,8 @@ class RobotProcess:
         Watches the parts of the run; parts added to the run are registered here.
     live_settings : LiveSettings
         The settings in force; a change applies from the next cycle on.
+    in_thread : callable
+        Calls a function in a thread that rests while a cycle is due.
     """
 
     def __init__(
@@ -122,15 +124,15 @@ class RobotProcess:
         self.live_settings = LiveSettings(settings)
         self._settings = settings
         """Those of the cycle in progress."""
-        self._log = log
-        self._observers = observers
+        self._log, self._observers = log, observers
         self._clock = run_clock(clock)
         self._notifier = SdNotifier() if notifier is None else notifier
         self.health = Health(log)
         self._driver = make_driver(settings)
         self._state = fresh_state(settings, recognises=preparation is None)
         self._scheduler = CycleScheduler(settings, self._clock, CALLBACKS)
-        used = (self._scheduler.gaps.to_thread, self._state.perception)
+        self.in_thread = self._scheduler.gaps.to_thread
+        used = (self.in_thread, self._state.perception)
         self._preparation = RunningPreparation(preparation, log, self._on_prepared, observers.on_starting, *used)
         timed = self.timing_monitor.timed
         handlers = (timed(LINE_OPENED, self._on_opened), timed(LINK_RECEIVE, self._on_data))
@@ -144,14 +146,12 @@ class RobotProcess:
         self._memory = MemoryPolicy(timed(COLLECTION, gc.collect))
         self._mode_log = ModeLog(log, self._notifier)
         self._object_log, self._line_log = ObjectLog(log), LineLog(log, line_messages)
-        self._alerts = Alerts()
+        self._alerts, self._stop = Alerts(), asyncio.Event()
         self._request: Request | None = None
         self._is_request_valid = always_valid
-        self._edits: list[Edit] = []
-        self._drive_inputs = DriveInputs()
+        self._edits, self._drive_inputs = list[Edit](), DriveInputs()
         self._arm_when_ready = self._is_connected = False
         self._footprint: Footprint | None = None
-        self._stop = asyncio.Event()
 
     def request(self, request: Request, is_valid: Callable[[], bool] = always_valid) -> None:
         """Pass a request to the next cycle; a stop is not overridden by an ARM in the same cycle.

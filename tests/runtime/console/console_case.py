@@ -68,6 +68,7 @@ class StubRun:
         self.live_settings = LiveSettings(self.settings)
         self.live_settings.subscribe(self.asked.append)
         self.stats = CycleStats(0.005)
+        self.in_thread = asyncio.to_thread
         self.timing_monitor = TimingMonitor(self.stats, ClockSampler().read, callbacks=CALLBACKS)
         self.state = State(Perception(self.settings.ring, self.settings.models, self.settings.perception))
 

@@ -321,6 +321,7 @@ async def test_pages_that_come_and_go_leave_nothing(pages: int, measured: Callab
         return len(gc.get_objects()), len(os.listdir("/proc/self/fd"))  # noqa: PTH208
 
     async with open_console() as case:
+        await case.settled(lambda: not case.console._tasks, "the reader of commands")
         tasks = len(asyncio.all_tasks())
 
         async def come_and_go(number: int) -> None:
