@@ -80,7 +80,9 @@ LIMITS: Sequence[str] = (
     "since it is there after .33 s.",
     "Something that is no recognised model and that no beam meets, or that returns no echo: glass at a "
     "slant, cloth, what is above or below the beams, or the end of a thin wall or a leg between two beams. Beams "
-    "that overlap at a distance leave gaps near a ring: those of the Denning within half a metre.",
+    "that overlap at a distance leave gaps near a ring: those of the Denning within half a metre. "
+    "Beams that end side by side leave a strip at any range, 6 cm wide between the AmigoBot's: a drum that reflects "
+    "like a mirror is not heard in it, and `check` says so.",
     "A smooth wall whose normal lies in a blind side of the ring: a robot that only looks ahead hears nothing of it "
     "as it draws near at a slant. Such a robot turns and looks to both sides every 2.5 m, remembers the walls that "
     "it heard, and presumes that they go on; a wall that begins between two looks is not known. A ring that does not "
