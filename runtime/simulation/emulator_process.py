@@ -73,10 +73,11 @@ async def start_emulator(
         port = _folder(stack) / "robot"
         words = ["emulate", "--link", str(port), "--end-with-parent", "--control", *arguments]
         interpreted = {} if compiled else {"NUMBA_DISABLE_JIT": "1"}
-        process: Child
+        process: Child | None = None
         if main is not None and can_fork():
-            process = await fork(main, words, interpreted)
-        else:
+            with contextlib.suppress(OSError):  # a program of its own needs less memory than a copy may
+                process = await fork(main, words, interpreted)
+        if process is None:
             process = await start_child(ECHOLOCATE, words, pipes=True, environment=interpreted)
         listener: asyncio.Task[None] | None = None
         try:

@@ -17,22 +17,29 @@ import threading
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Final
 
 FAILED: Final = 1
 STANDARD: Final = 3
 """Standard input, output and error."""
+OPEN_FILES: Final = "/proc/self/fd"
+"""Lists the descriptors that this process has open."""
+FILES_MAX: Final = 65536
+"""So many descriptors are closed where none are listed: the limit may be a thousand million, which takes minutes."""
 THREADS: Final = ("numba", "numpy")
 """Modules whose libraries may have started threads that Python does not know."""
 
 
 def can_fork() -> bool:
     """Return whether this process has one thread, and the system can follow a child by a descriptor."""
-    return (
-        hasattr(os, "pidfd_open")
-        and threading.active_count() == 1
-        and not any(name in sys.modules for name in THREADS)
-    )
+    if not hasattr(os, "pidfd_open") or threading.active_count() > 1 or any(name in sys.modules for name in THREADS):
+        return False
+    try:
+        os.close(os.pidfd_open(os.getpid()))
+    except OSError:  # an older kernel, or a container that forbids it
+        return False
+    return True
 
 
 class ForkedChild:
@@ -76,6 +83,11 @@ async def fork(main: Callable[[], None], arguments: Sequence[str], environment: 
         Of the program, without its name.
     environment : mapping
         Variables of its environment beside those of this process.
+
+    Raises
+    ------
+    OSError
+        The system makes no further process, or no further files.
     """
     (inputs, to_child), (from_child, outputs), (errors_of_child, errors) = os.pipe(), os.pipe(), os.pipe()
     for stream in (sys.stdout, sys.stderr):
@@ -83,7 +95,13 @@ async def fork(main: Callable[[], None], arguments: Sequence[str], environment: 
     before = signal.pthread_sigmask(
         signal.SIG_BLOCK, signal.valid_signals()
     )  # the loop's handlers are not the child's
-    pid = os.fork()
+    try:
+        pid = os.fork()
+    except OSError:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for descriptor in (inputs, to_child, from_child, outputs, errors_of_child, errors):
+            os.close(descriptor)
+        raise
     if pid == 0:
         _be_child(main, arguments, environment, (inputs, outputs, errors))
     signal.pthread_sigmask(signal.SIG_SETMASK, before)
@@ -113,11 +131,11 @@ def _be_child(
             signal.signal(number, signal.SIG_DFL)
         for target, stream in enumerate(streams):
             os.dup2(stream, target)
-        os.closerange(STANDARD, os.sysconf("SC_OPEN_MAX"))
+        _close_files()
         signal.pthread_sigmask(signal.SIG_SETMASK, ())
         gc.enable()
         sys.stdin = io.TextIOWrapper(io.FileIO(0, closefd=False), encoding="utf-8")
-        sys.stdout, sys.stderr = (_text(1), _text(2))
+        sys.stdout, sys.stderr = (_text(1), _text(2, is_by_line=True))
         sys.argv[1:] = arguments
         os.environ.update(environment)
         main()
@@ -133,5 +151,18 @@ def _be_child(
         os._exit(code)
 
 
-def _text(descriptor: int) -> io.TextIOWrapper:
-    return io.TextIOWrapper(io.FileIO(descriptor, "w", closefd=False), encoding="utf-8")
+def _close_files() -> None:
+    """Close all files that are open but the standard streams."""
+    try:
+        descriptors = [int(one.name) for one in Path(OPEN_FILES).iterdir()]
+    except OSError:
+        os.closerange(STANDARD, min(os.sysconf("SC_OPEN_MAX"), FILES_MAX))
+        return
+    for descriptor in descriptors:
+        if descriptor >= STANDARD:
+            with contextlib.suppress(OSError):  # the list's own is closed already
+                os.close(descriptor)
+
+
+def _text(descriptor: int, *, is_by_line: bool = False) -> io.TextIOWrapper:
+    return io.TextIOWrapper(io.FileIO(descriptor, "w", closefd=False), encoding="utf-8", line_buffering=is_by_line)

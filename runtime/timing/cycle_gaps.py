@@ -2,7 +2,8 @@
 
 A thread that works while a cycle runs takes the interpreter from it for milliseconds, each time that the cycle calls
 the system. So what a start still has to do once the robot drives is done in threads that look at each call of a
-function how far away the next cycle is.
+function how far away the next cycle is. From Python 3.12 on a trace function in one thread makes all threads slow,
+the cycles among them (a median of 207 µs became 553 µs): there the threads work as others do.
 """
 
 from __future__ import annotations
@@ -18,8 +19,12 @@ from typing import Final, ParamSpec, TypeVar
 P = ParamSpec("P")
 R = TypeVar("R")
 
+IS_TRACED: Final = sys.version_info < (3, 12)
+"""Whether threads look for the next cycle: a trace function costs only the thread that has it."""
 MARGIN_S: Final = 0.01
-"""Rest from this time before a cycle, s: the longest that one function of LLVM holds the interpreter."""
+"""Rest from this time before a cycle, s; a function of LLVM holds the interpreter for up to 15 ms."""
+SHARE_MIN: Final = 0.5
+"""Work for this share of a gap at least: at 200 Hz a gap is shorter than the margin, and loading must end."""
 REST_MAX_S: Final = 0.1
 """Longest rest, s: while time is paused no cycle comes, and the thread may hold a lock that the loop needs."""
 
@@ -49,12 +54,19 @@ class CycleGaps:
 
     def end(self, gap_s: float) -> None:
         """Let threads work: a cycle has ended, and the next one is due in `gap_s`."""
-        self._until_s = self._clock() + gap_s - MARGIN_S
+        self._until_s = self._clock() + max(gap_s - MARGIN_S, SHARE_MIN * gap_s)
         if self._threads:
             self._opened.set()
 
+    def close(self) -> None:
+        """Let threads work for good: there is no further cycle."""
+        self._until_s = math.inf
+        self._opened.set()
+
     async def to_thread(self, call: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Call a function in a thread that rests in cycles, and return what it returns."""
+        if not IS_TRACED:
+            return await asyncio.to_thread(call, *args, **kwargs)
 
         def resting() -> R:
             before = sys.gettrace()

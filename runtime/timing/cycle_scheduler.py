@@ -5,8 +5,8 @@ Pacer, waker, timing monitor and stall sampler do not depend on each other; the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
 from config.settings import Settings
@@ -67,13 +67,18 @@ class CycleScheduler:
             self.stats, sampler.read, lambda: self._stall_sampler.sample, callbacks, sampler.read_after
         )
 
-    def start(self, run_s: float, gap_max_s: float) -> AbstractContextManager[None]:
-        """Plan the first cycle for `run_s`; return a context in which stalls are sampled.
+    @contextmanager
+    def start(self, run_s: float, gap_max_s: float) -> Iterator[None]:
+        """Plan the first cycle for `run_s`; in this context stalls are sampled, and after it no thread rests.
 
         `gap_max_s` is the longest time between two commands that the base's deadman allows.
         """
         self._pacer = Pacer(run_s, self._period_s, self._step_s, CYCLE_GAP_SHARE * gap_max_s)
-        return self._stall_sampler.active()
+        try:
+            with self._stall_sampler.active():
+                yield
+        finally:
+            self.gaps.close()
 
     def on_echo(self, run_s: float) -> None:
         """Count an echo that has just been read from the line: it may begin the next cycle."""

@@ -89,6 +89,18 @@ async def test_an_emulator_without_kernels_runs_in_plain_python(children: Childr
         assert children.environment == {"NUMBA_DISABLE_JIT": "1"}
 
 
+async def test_where_no_copy_of_this_process_can_be_made_the_emulator_is_a_program_of_its_own(
+    children: Children, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def refuse(*_: object) -> None:
+        raise BlockingIOError("too many processes")
+
+    monkeypatch.setattr(emulator_process, "can_fork", lambda: True)
+    monkeypatch.setattr(emulator_process, "fork", refuse)
+    async with start_emulator([], main=lambda: None):
+        assert len(children.started) == 1
+
+
 async def test_an_emulator_that_does_not_end_is_killed(children: Children, monkeypatch: pytest.MonkeyPatch) -> None:
     children.program = IGNORES_SIGTERM
     monkeypatch.setattr(emulator_process, "END_MAX_S", 0.05)

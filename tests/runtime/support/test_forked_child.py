@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
+import signal
 import subprocess
 import sys
+from pathlib import Path
 from typing import Final
 
 import pytest
 
 from runtime.support.child_process import INTERPRETER, child_environment
-from runtime.support.forked_child import can_fork
+from runtime.support.forked_child import OPEN_FILES, can_fork, fork
 
 PROGRAM: Final = """
 import asyncio, gc, json, os, signal, sys, threading
@@ -28,6 +32,7 @@ def child():
     elif word == "fail":
         raise LookupError("no such world")
     elif word == "sleep":
+        print("warning", file=sys.stderr)
         print("ready", flush=True)
         signal.pause()
 
@@ -48,6 +53,7 @@ async def main():
     found["error"] = (await failed.stderr.read()).decode().splitlines()[-1]
     asleep = await fork(child, ["sleep"], {})
     await asleep.stdout.readline()
+    found["warned"] = (await asleep.stderr.readline()).decode().strip()
     found["running"] = asleep.returncode
     os.kill(asleep.pid, signal.SIGTERM)
     found["codes"].append(await asleep.wait())
@@ -77,6 +83,7 @@ def test_a_forked_child_has_its_own_streams_signals_and_end() -> None:
     assert found["echo"] == ["eno", "owt"]
     assert found["codes"] == [0, 7, 1, -15]
     assert found["error"] == "LookupError: no such world"
+    assert found["warned"] == "warning", "it is written by line"
     assert (found["running"], found["signals"]) == (None, []), "its signals are not its parent's"
     assert (found["can"], found["threaded"]) == (True, False)
 
@@ -85,3 +92,28 @@ def test_a_process_whose_libraries_may_have_threads_does_not_fork(monkeypatch: p
     monkeypatch.setattr("threading.active_count", lambda: 1)
     assert "numpy" in sys.modules
     assert not can_fork()
+
+
+def test_a_process_whose_system_refuses_descriptors_of_processes_does_not_fork(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("threading.active_count", lambda: 1)
+    monkeypatch.setattr("runtime.support.forked_child.THREADS", ())
+    assert can_fork()
+
+    def refuse(_pid: int) -> int:
+        raise OSError(errno.ENOSYS, "not implemented")
+
+    monkeypatch.setattr(os, "pidfd_open", refuse)
+    assert not can_fork()
+
+
+async def test_a_fork_that_the_system_refuses_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse() -> int:
+        raise OSError(errno.EAGAIN, "too many processes")
+
+    monkeypatch.setattr(os, "fork", refuse)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ()), len(list(Path(OPEN_FILES).iterdir()))
+    with pytest.raises(OSError, match="too many processes"):
+        await fork(lambda: None, [], {})
+    assert (signal.pthread_sigmask(signal.SIG_BLOCK, ()), len(list(Path(OPEN_FILES).iterdir()))) == before

@@ -7,7 +7,14 @@ import sys
 
 import pytest
 
-from runtime.timing.cycle_gaps import MARGIN_S, CycleGaps
+from runtime.timing import cycle_gaps
+from runtime.timing.cycle_gaps import MARGIN_S, SHARE_MIN, CycleGaps
+
+
+@pytest.fixture(autouse=True)
+def _traced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let threads look for cycles on each version of Python."""
+    monkeypatch.setattr(cycle_gaps, "IS_TRACED", True)
 
 
 class Clock:
@@ -47,6 +54,54 @@ async def test_a_thread_works_between_cycles_and_rests_before_and_in_one() -> No
     gaps.end(1.0)
     assert await task == 3
     assert steps == [0, 1, 2]
+
+
+@pytest.mark.parametrize("gap_s", [0.2 * MARGIN_S, 0.9 * MARGIN_S])
+async def test_a_thread_works_for_a_share_of_a_gap_that_is_shorter_than_the_margin(gap_s: float) -> None:
+    clock, steps = Clock(), []
+    gaps = CycleGaps(clock, rest_max_s=60.0)
+
+    def work() -> None:
+        for k in range(100):
+            called()
+            steps.append(k)
+            clock.now_s += 0.01 * gap_s
+
+    gaps.begin()
+    task = asyncio.create_task(gaps.to_thread(work))
+    for done in (50, 100):
+        await asyncio.sleep(0.01)
+        gaps.end(gap_s)
+        while len(steps) < done:
+            await asyncio.sleep(0.001)
+        await asyncio.sleep(0.01)
+        assert len(steps) <= done + 1, "a call that begins at the end of a share is done"
+        gaps.begin()
+        assert SHARE_MIN * 100 == 50
+    gaps.end(gap_s)
+    await asyncio.wait_for(task, 30.0)
+
+
+async def test_once_there_is_no_further_cycle_a_thread_works_to_its_end() -> None:
+    gaps = CycleGaps(lambda: 0.0, rest_max_s=60.0)
+    gaps.begin()
+    steps = []
+
+    def work() -> None:
+        for k in range(100):
+            called()
+            steps.append(k)
+
+    task = asyncio.create_task(gaps.to_thread(work))
+    await asyncio.sleep(0.01)
+    assert not steps
+    gaps.close()
+    await asyncio.wait_for(task, 30.0)
+
+
+async def test_where_a_trace_function_slows_all_threads_none_is_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cycle_gaps, "IS_TRACED", False)
+    assert await CycleGaps().to_thread(sys.gettrace) is None
 
 
 async def test_a_thread_rests_no_longer_than_it_may_hold_a_lock_and_its_errors_arrive() -> None:

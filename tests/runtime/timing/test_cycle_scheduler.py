@@ -53,6 +53,23 @@ def test_cycles_begin_at_their_period_and_with_an_echo_at_once(loop: VirtualLoop
     assert (scheduler.stats.late, scheduler.overrun) == (0, None)
 
 
+def test_after_the_last_cycle_no_thread_rests(loop: VirtualLoop, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is still being loaded when a short run ends is loaded at once: the end of the run waits for it."""
+    scheduler = CycleScheduler(SETTINGS, loop.time)
+    closed: list[str] = []
+    monkeypatch.setattr(scheduler.gaps, "close", lambda: closed.append("gaps"))
+
+    async def run() -> None:
+        with scheduler.start(loop.time(), 0.45):
+            if (now := await scheduler.wait()) is not None:
+                scheduler.begin(now)
+            assert not closed
+
+    loop.run_until_complete(run())
+    assert closed == ["gaps"]
+    scheduler.close()
+
+
 def test_overruns_in_a_row_are_a_reason_to_stop_that_names_the_cause(loop: VirtualLoop) -> None:
     scheduler = CycleScheduler(SETTINGS, loop.time, ("link receive",))
     receive = scheduler.timing_monitor.timed("link receive", lambda: loop.spend(2.0 * PERIOD_S))
