@@ -87,6 +87,8 @@ BUILT: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
 """Faults that a robot is built with: they are there from the start."""
 CLOCK, OF_TWO = "clock", ("exchanged", "but one")
 """Kinds with these words change nothing on a robot whose packets carry no stamps, and on one with one sensor."""
+HELD: Final = frozenset({LOST, NOTHING_NEW, NOTHING_YET, UNHEARD})
+"""Reasons to hold that name a lie; that of a ring which seems to be turned names only one that is."""
 AHEAD_DEG: Final = 60.0
 MOVED_M: Final = 0.5
 """A robot that has driven less since a lie began has hardly changed what it hears."""
@@ -317,7 +319,7 @@ def run_trial(
             if (
                 kind is not None
                 and held is None
-                and state.hold_reason in {DOUBTED, LOST, NOTHING_NEW, NOTHING_YET, UNHEARD}
+                and (state.hold_reason in HELD or (state.hold_reason == DOUBTED and kind.startswith("turned")))
             ):
                 texts.append(str(state.hold_reason))
             if texts:

@@ -2,8 +2,9 @@
 
 The ranges show how a ring is mounted only after some way (`perception.ring_faults.mounting`), and a robot whose ring
 is turned may meet a wall before. So it drives as the worst of the mountings allows that are not yet excluded: the
-echoes, turned about the ring's centre, limit the speed at which it comes nearer to them. In free
-space nothing changes.
+echoes, turned about the ring's centre, limit the speed at which it comes nearer to them. The turn stays as it was
+decided, so the curve becomes narrower: turning on the spot comes nearer to nothing, and a curve that is slowed down
+as a whole would hold the robot beside what it should turn from. In free space nothing changes.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ DOUBTED: Final = (
 def limit_by_mounting(
     twist: Twist, why: str | None, pose: Pose, monitor: RingMonitor, settings: Settings
 ) -> tuple[Twist, str | None]:
-    """Return a velocity on the same curve that is slow beside what may be ahead, and the reason if it is less.
+    """Return a velocity with the same turn that is slow beside what may be ahead, and the reason if it is less.
 
     Parameters
     ----------

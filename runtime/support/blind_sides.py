@@ -101,7 +101,7 @@ def _gap_notes(settings: Settings) -> list[str]:
     Sensors on a rim whose beams end side by side leave a strip as wide as their distance, at any range.
     """
     half = math.radians(settings.ring.beam_half_angle_deg)
-    widest_m, meets_m = max(_gaps_m(settings, half), default=(0.0, 0.0), key=lambda gap: gap[1])
+    widest_m, meets_m = max(_gaps_m(settings, half), default=(0.0, 0.0), key=lambda gap: (gap[1], gap[0]))
     if meets_m <= MEETS_M:
         return []
     where = "at any range" if math.isinf(meets_m) else f"up to {meets_m:.1f} m ahead"

@@ -146,7 +146,9 @@ class SettingsFiles:
                 self._put(document, document.path, text_with_places(text, settings.places))
 
     def _map_file(self, settings: Settings) -> DocumentRead | None:
-        """Return the file that has the known room, or had it before it was edited; None if that was loaded since.
+        """Return the file that has the known room, or had it before it was edited.
+
+        None if the room was loaded since the run began, or stands in the settings themselves.
 
         Raises
         ------
@@ -159,11 +161,11 @@ class SettingsFiles:
         for document in reversed(self._documents):  # the map is read after the emulator's world
             if document.kind == "worlds":
                 _, world = self._world(document)
-                if with_room(settings, world, document.name).perception.localization.known_room == room:
+                if _room(settings, world, document.name) == room:
                     self._map = (room, document)
                     return document
         known, document_before = self._map
-        if room == known and document_before is None:
+        if room == known and document_before is None and any(one.kind == "worlds" for one in self._documents):
             raise CommandError(
                 "the places are in force, but not kept: the map's file has changed since the run began; save the map"
             )
@@ -267,6 +269,14 @@ class SettingsFiles:
             _write(path.resolve(), text)
         except OSError as error:
             raise CommandError(f"{document.name}: cannot be written: {error.strerror or error}") from None
+
+
+def _room(settings: Settings, world: WorldConfig, name: str) -> WorldConfig | None:
+    """Return the known room of a run with this world as its map; None if it has no surface."""
+    try:
+        return with_room(settings, world, name).perception.localization.known_room
+    except ConfigError:
+        return None
 
 
 def _write(path: Path, text: str) -> None:

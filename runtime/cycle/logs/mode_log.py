@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from drivers.token_bucket import LineLimit
 from runtime.cycle.logs.mission_log import MissionLog
-from runtime.cycle.modes import STARTING, WAITING, Mode, ModeState
+from runtime.cycle.modes import RESTORED, STARTING, WAITING, Mode, ModeState
 from runtime.cycle.step import State
 from runtime.support.sd_notify import SdNotifier
 
@@ -32,7 +32,8 @@ class ModeLog:
     Attributes
     ----------
     stop_reasons
-        Of the newest stops, and of lines that were lost before a drive, in order; of one stop each that it had.
+        Of the newest stops, and of lines that were lost in READY, in order: each reason that a stop had, but that the
+        line is back. What a start waits for is no stop.
     hold_reasons
         Why the robot held in DRIVE for `HELD_S` or more, in order.
     missions
@@ -41,6 +42,8 @@ class ModeLog:
 
     def __init__(self, log: FilteringBoundLogger, notifier: SdNotifier) -> None:
         self.stop_reasons: list[str] = []
+        self._has_started = False
+        """Whether the robot has been in another mode than CONNECTING."""
         self._kept = set[str]()
         """Those of the present stop, without their numbers."""
         self.missions = MissionLog(log)
@@ -81,10 +84,13 @@ class ModeLog:
             write("mode", mode=mode.mode.value, reason=mode.reason, cycle=state.cycle, **more)
 
     def _keep(self, mode: ModeState) -> None:
-        """Keep the reason of a stop, unless this stop has had it already."""
+        """Keep the reason of a stop, unless this stop has had it already, or it says that the line is back."""
+        self._has_started |= mode.mode is not Mode.CONNECTING
         reason = (mode.reason or "").removeprefix(WAITING)
         text = NUMBER.sub("", reason)
-        if mode.mode in STOPPED and reason not in {"", STARTING} and text not in self._kept:
+        if not self._has_started or mode.mode not in STOPPED or reason in {"", STARTING}:
+            return
+        if not reason.startswith(RESTORED) and text not in self._kept:
             self._kept.add(text)
             self.stop_reasons.append(reason)
             del self.stop_reasons[:-STOP_REASONS_MAX]

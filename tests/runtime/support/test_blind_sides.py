@@ -17,7 +17,7 @@ from config.world import AcousticsConfig, DrumConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from perception.percept import Pose
-from runtime.support.blind_sides import blind_notes, blind_sides_deg, refuse_blind_ways, way_refusal
+from runtime.support.blind_sides import _gaps_m, blind_notes, blind_sides_deg, refuse_blind_ways, way_refusal
 from runtime.support.pattern_check import oldest_percept
 
 
@@ -53,6 +53,16 @@ def test_beams_that_end_side_by_side_leave_a_strip_in_which_a_mirroring_drum_is_
         chord_m = 2.0 * 0.2 * math.sin(math.radians(12.0))
         assert f"a strip {chord_m:.2f} m wide between them, at any range" in notes[0]
         assert "beams of ±15°" in notes[0]
+
+
+def test_of_strips_that_never_end_the_widest_is_named() -> None:
+    settings = robot(-36.0, -12.0, 12.0, 36.0, half_deg=12.0)
+    right, *others = settings.ring.sensors or ()
+    sensors = (right.model_copy(update={"y_m": right.y_m - 0.1, "x_m": right.x_m - 0.05}), *others)
+    wide = settings.model_copy(update={"ring": settings.ring.model_copy(update={"sensors": sensors})})
+    widths = [[width for width, _ in _gaps_m(one, math.radians(12.0))] for one in (settings, wide)]
+    assert max(widths[1]) > max(widths[0]) + 0.01
+    assert f"a strip {max(widths[1]):.2f} m wide" in " ".join(blind_notes(wide))
 
 
 def test_four_sensors_in_front_are_blind_behind_and_do_not_back() -> None:

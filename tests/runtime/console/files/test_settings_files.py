@@ -140,7 +140,7 @@ async def test_changed_places_are_kept_in_the_map_that_the_run_was_started_with(
         await files.keep_places(marked)
 
 
-@pytest.mark.parametrize("by", ["page", "editor", "editor before"])
+@pytest.mark.parametrize("by", ["page", "editor", "editor before", "editor, without walls"])
 async def test_places_are_kept_in_a_map_whose_walls_were_edited_since(tmp_path: Path, by: str) -> None:
     """A page or an editor may change the walls, which count at the next start; the places are kept beside them."""
     path = tmp_path / "map.toml"
@@ -151,10 +151,10 @@ async def test_places_are_kept_in_a_map_whose_walls_were_edited_since(tmp_path: 
     marked = settings.model_copy(update={"places": PlacesConfig(place=(PlaceConfig(name="a", x_m=1.0, y_m=2.0),))})
     number = len(files.listed()) - 1
     held = await files.read(number)
-    edited = held["text"].replace("4.0", "5.0")
+    edited = "# cleared\n" if "without" in by else held["text"].replace("4.0", "5.0")
     if by == "page":
         await files.save(number, edited, held["digest"])
-    elif by == "editor":
+    elif by != "editor before":
         await files.keep_places(marked)
         await files.keep_places(settings)
     if by != "page":
@@ -165,7 +165,18 @@ async def test_places_are_kept_in_a_map_whose_walls_were_edited_since(tmp_path: 
         return
     await files.keep_places(marked)
     assert path.read_text().startswith(edited)
-    assert with_known_room(settings, str(path)).places == marked.places
+    assert load_world(str(path)).places() == marked.places
+
+
+async def test_places_in_a_room_that_stands_in_the_settings_are_in_no_map(tmp_path: Path) -> None:
+    with noting_files_read():
+        load_settings("hallway")
+        documents = [one for one in documents_read() if one.kind != "worlds"]
+    walls = tmp_path / "map.toml"
+    walls.write_text("[[wall]]\nx1_m = 0.0\ny1_m = 3.0\nx2_m = 4.0\ny2_m = 3.0\n")
+    settings = with_known_room(load_settings("hallway"), str(walls))
+    files = SettingsFiles(documents, settings, lambda: settings, lambda: None)
+    await files.keep_places(settings)
 
 
 async def test_places_on_a_shipped_map_are_kept_for_the_next_run_with_it(

@@ -53,6 +53,22 @@ def test_of_one_stop_each_reason_is_kept_once_whatever_its_numbers() -> None:
         state: Any = SimpleNamespace(mode=replace(stop, reason=reason), cycle=k, hold_reason=None, drive_request=None)
         log.observe(state, before, 0.05 * k)
         before = state.mode
-    assert log.stop_reasons == [silent.format(0.4), deaf, f"{RESTORED} (what was wrong: {deaf})"]
+    assert log.stop_reasons == [silent.format(0.4), deaf]
+    state.mode = replace(stop, reason=deaf)
     log.observe(state, ModeState(Mode.DRIVE), 2.0)
-    assert log.stop_reasons[3:] == [f"{RESTORED} (what was wrong: {deaf})"], "another stop"
+    assert log.stop_reasons[2:] == [deaf], "another stop"
+
+
+def test_what_a_start_waits_for_is_no_stop_and_a_line_that_is_lost_in_ready_is_one() -> None:
+    log, before = ModeLog(structlog.wrap_logger(None, processors=[drop]), SdNotifier()), ModeState()
+    unanswered, lost = "the robot does not answer HELLO", "the line to the robot is gone"
+    modes = [
+        ModeState(), ModeState(reason=unanswered), ModeState(Mode.READY, 1.0),
+        ModeState(Mode.CONNECTING, 1.0, lost), ModeState(Mode.CONNECTING, 1.0, unanswered),
+        ModeState(Mode.READY, 3.0),
+    ]  # fmt: skip
+    for k, mode in enumerate(modes):
+        state: Any = SimpleNamespace(mode=mode, cycle=k, hold_reason=None, drive_request=None)
+        log.observe(state, before, 0.05 * k)
+        before = mode
+    assert log.stop_reasons == [lost, unanswered]
