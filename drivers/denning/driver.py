@@ -353,6 +353,7 @@ class DenningDriver(Session[PoseStamper]):
                 del self._commands[name]
                 self._problem = problem
             else:
+                self.is_other_robot = name == "PATTERN"
                 self._go_down(problem)
         elif nak.of in self._drive_acks:
             self._drive_acks.forget()

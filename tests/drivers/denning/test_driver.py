@@ -152,7 +152,7 @@ def test_a_refused_pattern_takes_the_link_down(code: int, text: str) -> None:
     harness.answer()
     (pattern,) = harness.received()
     harness.send(Nak(0, pattern.seq, code))
-    assert harness.state() is LineState.DOWN
+    assert (harness.state(), harness.robot.is_other_robot) == (LineState.DOWN, True)
     with pytest.raises(AssertionError, match=text):
         raise AssertionError(harness.robot.problem)
 

@@ -14,12 +14,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from config.robot import RobotConfig
-from drivers.driver import LineState
+from drivers.driver import LineState, RobotDriver
 from drivers.heard_bytes import HeardBytes
 from drivers.link import Link, LinkError
 from drivers.messages import Flags, Identity
 from drivers.registry import line_options, make_driver, other_robot
-from drivers.session import Session
 from runtime.cycle.connection import POLL_S, Connection
 
 ANSWER_MAX_S: Final = 3.0
@@ -36,6 +35,9 @@ NOTHING: Final = "nothing answers: is the robot on, and is this its cable?"
 NO_FRAME: Final = (
     "no robot answers, and what is received is no frame of a known robot; another device is on this port, or one of "
     "another speed: name its file with --robot"
+)
+UNREADY: Final = (
+    "it answers, but does not finish the handshake: restart the robot, and check its cable in both directions"
 )
 WARNINGS: Final = (
     (Flags.MOTOR_FAULT, "a motor reports a fault"),
@@ -74,9 +76,10 @@ class _Answer(NamedTuple):
 async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
     """Return what answers on a port.
 
-    Robots of one driver and one speed are tried one after the other as long as something answers them and either
-    is ready or says that it is another robot; what answers one family is not asked by the next. One of which all
-    sensors fire is the robot; some controllers do not name theirs, and the one of which most fire is chosen.
+    Robots of one driver and one speed (a socket has none) are tried one after the other as long as something answers
+    them and either is ready or says that it is another robot; what answers one family is not asked by the next. One
+    of which all sensors fire is the robot; some controllers do not name theirs, and the one of which most fire is
+    chosen.
 
     Parameters
     ----------
@@ -87,8 +90,10 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
     """
     said, best = dict[str, list[str]](), (0, Finding(None, ()))  # what was said as which robots
     strangers, tries = list[str](), itertools.count()
-    families = [list(ones) for _, ones in itertools.groupby(sorted(robots.items(), key=_family), key=_family)]
-    answer_max_s = min(ANSWER_MAX_S, SOCKET_MAX_S / len(families)) if "://" in port else ANSWER_MAX_S
+    is_socket = "://" in port
+    key = partial(_family, is_socket=is_socket)
+    families = [list(ones) for _, ones in itertools.groupby(sorted(robots.items(), key=key), key=key)]
+    answer_max_s = min(ANSWER_MAX_S, SOCKET_MAX_S / len(families)) if is_socket else ANSWER_MAX_S
     for family in families:
         for name, config in family:
             answer = await _try(port, config, answer_max_s, again=next(tries) > 0)
@@ -122,8 +127,8 @@ def run_it(port: str, robot: str) -> str:
     return shlex.join(("echolocate", "run", "--robot", robot, "--port", port))
 
 
-def _family(item: tuple[str, RobotConfig]) -> tuple[str, int]:
-    return item[1].robot.driver, item[1].link.baud
+def _family(item: tuple[str, RobotConfig], *, is_socket: bool) -> tuple[str, int]:
+    return item[1].robot.driver, 0 if is_socket else item[1].link.baud
 
 
 async def _try(port: str, config: RobotConfig, answer_max_s: float, *, again: bool = False) -> _Answer:
@@ -168,11 +173,12 @@ async def _try(port: str, config: RobotConfig, answer_max_s: float, *, again: bo
             send()
             has_answered = driver.counts.frames > 0
             if driver.state is LineState.DOWN and has_answered:
-                is_other = isinstance(driver, Session) and driver.is_other_robot
-                return _Answer(has_answered=True, problem=driver.problem, is_other=is_other)
-            if clock() - begin_s > (READY_MAX_S if has_answered else answer_max_s):
-                stranger = heard.stranger or NO_FRAME if heard.total and not has_answered else None
-                return _Answer(has_answered, stranger=stranger)
+                return _Answer(has_answered=True, problem=driver.problem, is_other=_is_other(driver))
+            if has_answered and clock() - begin_s > READY_MAX_S:
+                problem = driver.problem or UNREADY
+                return _Answer(has_answered=True, problem=problem, is_other=_is_other(driver))
+            if not has_answered and clock() - begin_s > answer_max_s:
+                return _Answer(has_answered=False, stranger=heard.stranger or NO_FRAME if heard.total else None)
             await asyncio.sleep(POLL_S)
         if not link.is_open:
             return _Answer(has_answered=False, problem=link.last_error)
@@ -181,6 +187,11 @@ async def _try(port: str, config: RobotConfig, answer_max_s: float, *, again: bo
         if driver.state is LineState.READY:
             await connection.shut_down()
         await link.stop()
+
+
+def _is_other(driver: RobotDriver) -> bool:
+    """Return whether the robot says that it is another one; a driver need not know, and may be behind another one."""
+    return bool(getattr(driver, "is_other_robot", False))
 
 
 async def _open(link: Link, tries_s: float, clock: Callable[[], float]) -> None:

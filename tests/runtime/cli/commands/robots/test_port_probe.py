@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from config.load import load_robot
-from config.robot import RobotConfig
+from config.robot import CalibrationConfig, RobotConfig
+from drivers.calibrated_driver import CalibratedDriver
+from drivers.driver import LineState
 from drivers.link import Link, LinkError
+from drivers.messages import LinkCounts
 from runtime.cli.commands.robots import port_probe
 from tests.hil.machine import TIMEOUT_S
 
@@ -74,6 +79,64 @@ async def test_what_answers_one_family_is_asked_again_only_if_it_says_what_it_is
     tried.clear()
     await port_probe.probe_port("/dev/ttyUSB0", robots)
     assert waits_s == {port_probe.SOCKET_MAX_S / 3, port_probe.ANSWER_MAX_S}, "at each speed of a line"
+
+
+class Answering:
+    """A driver whose robot has sent a frame."""
+
+    def __init__(self, state: LineState, problem: str | None, *, is_other_robot: bool) -> None:
+        self.state, self.problem, self.is_other_robot = state, problem, is_other_robot
+        self.counts, self.line_baud = LinkCounts(frames=1), None
+
+    def outgoing(self, **_: bool) -> bytes:
+        return b""
+
+    def line_opened(self, run_s: float) -> None: ...
+
+    def line_closed(self) -> None: ...
+
+    def tick(self, run_s: float) -> None: ...
+
+
+@pytest.mark.parametrize(
+    ("driver", "answer"),
+    [
+        (Answering(LineState.DOWN, "has 8 sensors", is_other_robot=True), ("has 8 sensors", True)),
+        (Answering(LineState.HANDSHAKE, None, is_other_robot=False), (port_probe.UNREADY, False)),
+        (Answering(LineState.HANDSHAKE, "no FIRE", is_other_robot=False), ("no FIRE", False)),
+    ],
+    ids=["another robot", "a robot that falls silent", "a robot that refuses to fire"],
+)
+async def test_what_has_answered_and_is_not_ready_is_said_also_behind_a_calibrated_driver(
+    driver: Any, answer: tuple[str, bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def open_once(_link: Link) -> None: ...
+
+    calibrated = CalibratedDriver(driver, CalibrationConfig(distance_scale=1.01), synchro=False)
+    monkeypatch.setattr(port_probe, "make_driver", lambda _config: calibrated)
+    monkeypatch.setattr(port_probe, "READY_MAX_S", 0.0)
+    monkeypatch.setattr(Link, "open_once", open_once)
+    monkeypatch.setattr(Link, "is_open", True)
+    found = await port_probe._try("socket://localhost:1", load_robot("p3dx"), 0.0)
+    assert found == port_probe._Answer(has_answered=True, problem=answer[0], is_other=answer[1])
+
+
+async def test_a_socket_has_no_speeds_so_that_its_families_are_those_of_the_drivers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = load_robot("p3dx")
+    fast = robot.model_copy(update={"link": robot.link.model_copy(update={"baud": 115200})})
+    asked = list[float]()
+
+    async def answer(_port: str, _config: RobotConfig, answer_max_s: float, **_: bool) -> port_probe._Answer:
+        asked.append(answer_max_s)
+        return port_probe._Answer(has_answered=False)
+
+    monkeypatch.setattr(port_probe, "_try", answer)
+    for port, tries in (("socket://localhost:1", 1), ("/dev/ttyUSB0", 2)):
+        asked.clear()
+        await port_probe.probe_port(port, {"p3dx": robot, "fast": fast})
+        assert asked == [port_probe.ANSWER_MAX_S] * tries
 
 
 async def test_a_port_that_is_still_busy_with_the_robot_tried_before_is_opened_again(
