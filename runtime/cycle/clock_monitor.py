@@ -14,6 +14,7 @@ Small errors of the rate are the driver's to find, over minutes (`drivers.robot_
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -134,6 +135,12 @@ class ClockMonitor:
                 clock = ClockState.SLOW
             late = reading
         return ClockMonitor(clock, reading, 0, lead, late, heard)
+
+    def fired_s(self, run_s: float) -> float:
+        """Return for how long the ring has fired on this line, s; 0 before its first firing, inf after a period."""
+        if self.heard is None:
+            return 0.0
+        return math.inf if self.heard.before_s else run_s - self.heard.begin_run_s
 
     def now_s(self, robot_s: float, run_s: float) -> float:
         """Return the robot's time now, at which no echo is younger than the time since its arrival.

@@ -120,19 +120,19 @@ def blind_reason(blind_s: float, line_problem: str | None, *, fires: bool) -> st
     )
 
 
-def unseen_reason(unseen: Unseen, driven_s: float, ring: RingConfig) -> str:
+def unseen_reason(unseen: Unseen, fired_s: float, ring: RingConfig) -> str:
     """Return why the robot stands that does not see its way; one that has just started needs time, and no check.
 
     Parameters
     ----------
     unseen
         The arbiter's decision.
-    driven_s
-        Time since DRIVE was entered, s.
+    fired_s
+        Time since the ring's first firing on this line, s.
     ring
         The robot's.
     """
     is_new = unseen.sensors and math.isinf(unseen.age_s)
-    if is_new and driven_s <= FIRST_LOOK_PATTERNS * firing_pattern(ring).cycle_s:
+    if is_new and fired_s <= FIRST_LOOK_PATTERNS * firing_pattern(ring).cycle_s:
         return FIRST_LOOK
     return unseen.reason

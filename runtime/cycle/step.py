@@ -357,7 +357,8 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
         driven_s = inputs.run_s - state.mode.entered_run_s
         if min(decision.age_s - age_max_s, driven_s) <= age_max_s:
             # It stands until the ring looks there: echoes were lost, or not every sensor has fired since the start.
-            reason, decision = unseen_reason(decision, driven_s, settings.ring), Drive(STANDSTILL)
+            fired_s = state.clock_monitor.fired_s(inputs.run_s)
+            reason, decision = unseen_reason(decision, fired_s, settings.ring), Drive(STANDSTILL)
     if isinstance(decision, Drive):
         slow_reason = state.echo_watch.slow_reason(settings.ring.range_max_m)
         twist, slowed = limit_unheard(decision.twist, percept, unheard, settings, slow_reason)

@@ -116,3 +116,15 @@ def test_a_latched_clock_stops_the_drive_and_refuses_to_arm() -> None:
     run.cycle(Request.ARM)
     run.until(6.0)
     assert (run.mode, run.state.mode.reason) == (Mode.SAFE_STOP, CLOCK_REASONS[ClockState.STANDS])
+
+
+def test_a_ring_fires_for_as_long_as_since_its_first_firing_on_this_line() -> None:
+    monitor, found = ClockMonitor(), []
+    for k in range(400):
+        run_s = 10.0 + 0.05 * k
+        firing = Firing(0.05 * k, HERE, 0.0, np.full(4, 1.0))
+        monitor = monitor.observe(None, (firing,) if k >= 10 else (), run_s)
+        found.append(monitor.fired_s(run_s))
+    assert found[:12] == pytest.approx([0.0] * 11 + [0.05])
+    assert found[60] == pytest.approx(2.5)
+    assert found[-1] == np.inf
