@@ -173,7 +173,7 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         ),
         "P14": Promise(
             "Input files cannot do harm",
-            "2,000 mutated ring logs, worlds, models, robot files (soak: 10⁵): clear "
+            "750 mutated ring logs, worlds, models, robot and run files (soak: 10⁵): clear "
             "error or right result, no traceback, no hang, memory ≤ 500 MB",
         ),
         "P15": Promise(

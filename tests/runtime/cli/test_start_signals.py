@@ -38,15 +38,19 @@ def hook(name, args):
             signal.raise_signal(number)
 
 from runtime.cli.__main__ import main
+from runtime.support import forked_child
+if event == "subprocess.Popen":
+    forked_child.can_fork = lambda: False
 sys.addaudithook(hook)
 main()
 """
-"""Runs the command line and raises a signal at the n-th event of a kind."""
+"""Runs the command line and raises a signal at the n-th event of a kind; for Popen, it cannot fork its emulator."""
 MOMENTS: Final = [
     ("import", 30, signal.SIGINT),
     ("import", 300, signal.SIGHUP),
     ("tempfile.mkdtemp", 1, signal.SIGTERM),
     ("os.fork", 1, signal.SIGINT),
+    ("subprocess.Popen", 1, signal.SIGINT),
 ]
 
 
@@ -84,7 +88,7 @@ def test_a_signal_during_the_start_leaves_nothing(
         time.sleep(0.05)
     assert list(temporary.iterdir()) == []
     measured(
-        "SIGINT, SIGTERM and SIGHUP at four moments of a start: exit code 128 + n, no process, folder or traceback"
+        "SIGINT, SIGTERM and SIGHUP at five moments of a start: exit code 128 + n, no process, folder or traceback"
     )
 
 
