@@ -93,11 +93,22 @@ def fit_beams(looks: Looks, sensors: int) -> BeamFit:
     sensors
         Number of sensors of the ring.
     """
-    coarse = _turns(TURN_STEPS_RAD[0])
-    half_angle, everything = _best_beam(looks, sensors, coarse, HALF_ANGLES_RAD, (False, True))
-    between = (half_angle + k * HALF_ANGLE_STEP_RAD for k in range(-7, 8))
-    half_angle, everything = _best_beam(looks, sensors, coarse, between, (everything,))
+    half_angle, everything = best_beam(looks, sensors)
     return fit_directions(looks, sensors, half_angle, everything=everything)
+
+
+def best_beam(looks: Looks, sensors: int) -> tuple[float, bool]:
+    """Return half of the likeliest beam's opening, rad, and whether all in it answers.
+
+    Parameters
+    ----------
+    looks, sensors
+        As for `fit_beams`.
+    """
+    coarse = _turns(TURN_STEPS_RAD[0])
+    half_angle, everything = _likeliest(looks, sensors, coarse, HALF_ANGLES_RAD, (False, True))
+    between = (half_angle + k * HALF_ANGLE_STEP_RAD for k in range(-7, 8))
+    return _likeliest(looks, sensors, coarse, between, (everything,))
 
 
 def fit_directions(looks: Looks, sensors: int, half_angle: float, *, everything: bool) -> BeamFit:
@@ -130,7 +141,7 @@ def _turns(step_rad: float) -> Floats:
     return np.arange(-TURN_MAX_RAD, TURN_MAX_RAD + 0.5 * step_rad, step_rad)
 
 
-def _best_beam(
+def _likeliest(
     looks: Looks, sensors: int, turns: Floats, half_angles: Iterable[float], kinds: Iterable[bool]
 ) -> tuple[float, bool]:
     """Return the likeliest half angle, and whether everything echoes, each sensor turned as fits it best."""

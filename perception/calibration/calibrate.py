@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import Firing
-from perception.calibration.beam_fit import HALF_ANGLE_STEP_RAD, BeamFit, Looks, fit_beams, fit_directions
+from perception.calibration.beam_fit import HALF_ANGLE_STEP_RAD, BeamFit, Looks, best_beam, fit_beams, fit_directions
 from perception.calibration.drive import Drive, Scales, drive_of
 from perception.calibration.geometry_fit import (
     GATE_SIGMAS,
@@ -196,7 +196,7 @@ def _halves(drive: Drive, fit: GeometryFit, beam_fit: BeamFit, nominal: Floats, 
         fits.append(found)
         directions.append(beams.turns)
         sigmas.append(_turn_sigmas(beams, found, echoes))
-        half_angles.append(fit_beams(looks, len(nominal)).half_angle)
+        half_angles.append(best_beam(looks, len(nominal))[0])
     one, other = fits
     variances = np.array(one.scale_sigmas) ** 2 + np.array(other.scale_sigmas) ** 2
     scales = (np.array(one.geometry.scales) - np.array(other.geometry.scales)) ** 2 / variances
