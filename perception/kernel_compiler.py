@@ -182,9 +182,15 @@ class _KernelCache:
             data = _files()._load_data(self._name(sig, target_context))
         except FileNotFoundError:
             return None
-        called = data[1]  # numba calls no code of which it has not seen the name
-        target_context.codegen()._engine._defined_symbols |= {called.llvm_func_name, called.llvm_cpython_wrapper_name}
-        return compiler.CompileResult._rebuild(target_context, *data)
+        called, engine = data[1], target_context.codegen()._engine
+        # Numba calls no code of which it has not seen the name, and ends the process for a name without code.
+        names = {called.llvm_func_name, called.llvm_cpython_wrapper_name} - engine._defined_symbols
+        engine._defined_symbols |= names
+        try:
+            return compiler.CompileResult._rebuild(target_context, *data)
+        except BaseException:
+            engine._defined_symbols -= names
+            raise
 
     def save_overload(self, sig: Untyped, compiled: Untyped) -> None:
         """Keep the compiled code for a signature."""

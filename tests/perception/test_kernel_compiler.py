@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from numba.core import event
 from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
 
 from perception.kernel import Floats, kernel
 from runtime.support.child_process import child_environment
@@ -122,6 +123,27 @@ def test_kernels_are_loaded_without_the_compiler_and_those_that_allocate_with_th
     runs = [subprocess.run([sys.executable, program], env=environment, check=True, capture_output=True, text=True)
             for _ in range(2)]  # fmt: skip
     assert [run.stdout.split() for run in runs] == [["500000.0", "0", "0"], ["500000.0", "1", "1"]]
+
+
+@kernel
+def three() -> int:
+    return 3
+
+
+def test_code_that_could_not_be_loaded_is_not_said_to_be_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert three() == 3
+    dispatcher, names = cast("Any", three), set[str]()
+    context = dispatcher.targetdescr.target_context
+    monkeypatch.setattr(context.codegen()._engine, "_defined_symbols", names)
+
+    def fail(*_: object) -> None:
+        assert len(names) == 2
+        raise MemoryError
+
+    monkeypatch.setattr(CompileResult, "_rebuild", fail)
+    with pytest.raises(MemoryError):
+        dispatcher._cache.load_overload((), context)
+    assert names == set()
 
 
 @kernel
