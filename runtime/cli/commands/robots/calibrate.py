@@ -140,7 +140,7 @@ def refuse_without_gain(file: str, found: Calibration, *, lag_is_new: bool) -> N
     if not (found.has_gain or lag_is_new):
         raise UserError(
             f"{file}: the robot is as its file says, as far as this drive shows: nothing differs by more than the "
-            "noise of the drive explains; nothing was written, and nothing is to be done",
+            "noise of the drive explains, so nothing was written; a longer drive shows smaller differences",
             FAILED,
         )
 
