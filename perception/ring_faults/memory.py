@@ -111,7 +111,7 @@ class RingTrace(Record):
     turned_nat: Annotated[Floats, QUARTERS, FINITE]
     """Evidence that the ring is mounted turned by so many quarters, nat."""
     excluded_nat: Annotated[Floats, QUARTERS, FINITE]
-    """Evidence since the start that it is not, nat; kept where it suffices."""
+    """Evidence that it is not, nat, since the start or the last reset of the odometry; kept where it suffices."""
     misses: Annotated[Floats, LOOK_KINDS, POSITIVE]
     """Looks of each kind that missed a known echo."""
     looks: Annotated[Floats, LOOK_KINDS, POSITIVE]

@@ -9,14 +9,17 @@ can only be compared with how it moves. An honest ring among objects that stand 
 - *Replaying.* Readings change, but as others did before, to the bit (`perception.ring_faults.replays`).
 - *Missing.* Readings do not depend on what is there: known echoes are silent all at once, or elsewhere, as random
   ranges are. How often an honest ring misses a known echo is learned on the way.
-- *Turned.* The ranges change as they would on a ring that is mounted turned by 90°, 180° or 270°.
+- *Turned.* The ranges change as they would on a ring that is mounted turned by 90°, 180° or 270°
+  (`perception.ring_faults.mounting`). `EXCLUDED_NAT` of evidence exclude such a mounting until the odometry is
+  reset; before, it limits the speed beside what would be ahead, and `DOUBTED_NAT` of evidence for it everywhere. A
+  corridor does not tell a half turn.
 - *Changed.* All readings change at once from one round of the firing pattern to the next, by a change that the
   sensors have in common (`perception.ring_faults.changes`).
 - *Exchanged.* What a sensor hears is what others heard where another one looks, or behind it; or it hears nothing of
   it (`perception.ring_faults.wiring`).
 
 All but the changes at once are sequential tests, with one threshold for all,
-`perception.ring_faults.motion_tests.EVIDENCE_NAT`. The same threshold names a single sensor that repeats its reading
+`perception.ring_faults.memory.EVIDENCE_NAT`. The same threshold names a single sensor that repeats its reading
 while no wall along the path may answer it: a frozen ring may have heard a single echo.
 A lie that agrees with the motion, as ranges that are all too long by the same amount do, can be found only as it
 begins.
@@ -241,8 +244,8 @@ class RingMonitor:
         """
         if self._on_servo:
             return self._places[:0]
-        mounts = self._turned if self._turns else self._mounts
-        return self._places[: possible_places(mounts, self._echo_records, self._ring_records, self._places)]
+        found = possible_places(self._mounts, self._echo_records, self._ring_records, self._places)
+        return self._places[:found]
 
     @property
     def is_doubted(self) -> bool:

@@ -2,7 +2,7 @@
 
 Each test sums the logarithms of likelihood ratios, never below zero (CUSUM, Page 1954): how much better a reading is
 explained by a ring that lies than by an honest one among objects that stand still. The sum is compared with
-`EVIDENCE_NAT`, the one threshold.
+`perception.ring_faults.memory.EVIDENCE_NAT`, the one threshold.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from perception.sensor_faults.wall import NOISE_SHARE
 from perception.sensor_mounts import RingPose
 
 CHANGE_NAT: Final = math.log(3e5 / 0.002)
-"""The same for changes from one round of the firing pattern to the next, of which a day has some 3·10⁵, nat."""
+"""`EVIDENCE_NAT` for changes from one round of the firing pattern to the next, of which a day has 3·10⁵, nat."""
 REPLAY_NAT: Final = EVIDENCE_NAT + math.log(PAST_LOOKS)
 """The same for a replay, of which each lag is tested, nat."""
 RESTART_M: Final = 0.25

@@ -25,7 +25,7 @@ CHATTER_SHARE: Final = 0.002
 """A range varies by at least this share of it from look to look, also where a wall along the path answers."""
 EQUAL_PRIOR: Final = 2e-8
 """Odds that an honest ring is without such noise, as that of an emulator between walls may be: equal readings alone
-fall short of `motion_tests.EVIDENCE_NAT` by one change that was due. They suffice once its noise is known."""
+fall short of `memory.EVIDENCE_NAT` by one change that was due. They suffice once its noise is known."""
 NOISY_NAT: Final = math.log(0.5 / 0.02)
 """Evidence for noise of a reading that changed by more than its resolution although the sensor hardly moved, nat:
 half do so with noise, and two of a hundred without, as what is there may move."""
@@ -75,7 +75,7 @@ def is_parallel_wall(
         The ring's way so far, m.
     """
     half_angle, tolerance, reach = reception
-    path = math.atan2(way[1], way[0])
+    slack, path = tolerance + NOISE_SHARE * r, math.atan2(way[1], way[0])
     forward, left = math.sin(yaw - path), math.cos(yaw - path)
     axis = wrapped(yaw + mounts[i, 2] - path)
     for turn in range(2):
@@ -84,14 +84,17 @@ def is_parallel_wall(
         if math.sin(nearest) < 1e-3:
             continue
         beside = side * (mounts[i, 0] * forward + mounts[i, 1] * left)
-        slack = tolerance + NOISE_SHARE * r + abs(r / math.tan(nearest)) * lean
+        ahead = mounts[i, 0] * left - mounts[i, 1] * forward
+        steep, shallow = max(1e-3, math.sin(nearest + lean)), max(1e-3, math.sin(nearest - lean))
         for k in range(len(echoes)):
             c = echoes[k]
             bearing = side * wrapped(yaw + mounts[k, 2] - path)
             is_fresh = c.agreed_m > 0.0 and path_m - c.agreed_path_m <= reach
             if is_fresh and abs(bearing - 0.5 * math.pi) <= half_angle:
                 wall = side * (mounts[k, 0] * forward + mounts[k, 1] * left) + c.agreed_m
-                if abs((wall - beside) / math.sin(nearest) - r) <= slack:
+                apart = (ahead - mounts[k, 0] * left + mounts[k, 1] * forward) * math.sin(lean)
+                nears, recedes = (wall - beside - apart) / steep, (wall - beside + apart) / shallow
+                if min(nears, recedes) - slack <= r <= max(nears, recedes) + slack:
                     return True
     return False
 

@@ -67,8 +67,10 @@ def fits_unseen_wall(
     for turn in range(2):
         side = 1.0 - 2.0 * turn
         nearest = towards_wall(side * axis, half_angle)
-        least = min(math.sin(nearest - lean), math.sin(nearest + lean))
-        if least < 1e-3 or abs(change) > error + moved * math.sin(lean) / least:
+        if math.sin(nearest) < 1e-3:
+            continue
+        least = max(1e-3, min(math.sin(nearest - lean), math.sin(nearest + lean)))
+        if abs(change) > error + moved * math.sin(lean) / least:
             continue
         is_seen = False
         for k in range(len(mounts)):

@@ -58,6 +58,17 @@ def test_a_rough_wall_beside_the_path_explains_what_sensors_hear_of_it(side: int
     assert not is_parallel_wall(oblique, at_edge, (0.3, 0.0), 0.0, MOUNTS, RECEPTION, 0.01, echoes, 0.3)
 
 
+@pytest.mark.parametrize("lean", [0.2, -0.2])
+def test_a_wall_that_leans_is_farther_or_nearer_from_a_sensor_ahead(lean: float) -> None:
+    """The one square to the path is 0.4 m behind; the beam's edge at 57° meets the wall at another angle."""
+    mounts = np.array([[-0.2, 0.0, math.radians(90.0)], [0.2, 0.0, math.radians(45.0)]])
+    echoes = heard((0, 1.0))
+    r = (1.0 + 0.4 * math.sin(lean)) / math.sin(math.radians(57.0) - lean)
+    for most, explained in ((0.21, True), (0.1, False)):
+        found = is_parallel_wall(1, r, (0.3, 0.0), 0.0, mounts, RECEPTION, most, echoes[:2], 0.3)
+        assert bool(found) is explained
+
+
 def test_a_sensor_that_looks_ahead_should_change_with_the_way() -> None:
     echoes = heard((0, 2.0))
     assert [due(echoes, 0, x) for x in (0.05, 0.07, 0.13, 1.0)] == [0.0, 1.0, 2.0, 16.0]

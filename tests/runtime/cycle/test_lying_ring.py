@@ -44,7 +44,7 @@ def test_it_stops_with_the_reason_before_it_touches_anything(
     lie: str, robot: str, measured: Callable[[str], None]
 ) -> None:
     fault, reason = LIES[lie]
-    run = driven(robot, fault)
+    run = driven(robot, fault, until_s=30.0)  # one that seems turned creeps until it is named
     assert run.mode is Mode.SAFE_STOP
     assert reason in str(run.state.mode.reason)
     assert str(run.state.mode.reason).endswith(", then re-arm")
