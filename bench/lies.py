@@ -13,22 +13,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from pydantic import TypeAdapter
 from rich.table import Table
 
-from bench.sparse_rings import RINGS, with_ring
-from bench.trials.furnished_rooms import ACOUSTICS, furnished_room
-from config.load import load_settings
+from bench.trials.room_drives import drive_settings, make_drive
 from config.settings import Settings
-from config.world import StartConfig, WallConfig, WorldConfig
-from drivers.emulator.acoustics import clearance
 from drivers.emulator.faults import Fault
 from drivers.emulator.memory_transport import MemoryLine
-from drivers.emulator.scene import compile_scene
-from drivers.messages import Pose
 from drivers.registry import make_device, make_driver
 from runtime.cycle.drive_requests import first_request, needs_recognition
 from runtime.cycle.echo_watch import NOTHING_NEW, NOTHING_YET
@@ -44,7 +38,6 @@ ROBOTS: Final = (
     "amigo", "atrvjr", "b21r", "b21r-base", "b21r-both", "denning", "ears", "hobby3", "hobby8", "magellan", "p3at",
     "p3dx", "p3dx-sh", "parking12", "peoplebot", "powerbot", "servo1",
 )  # fmt: skip
-ROOMS: Final = ("room", "office", "hallway", "furnished", "goal", "corridor")
 AHEAD, ALL_BUT_ONE, ONE = "ahead", "all but one", "one"
 """In place of the numbers of sensors: those within 60° of the robot's front; all but one ahead; that one."""
 KINDS: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
@@ -102,22 +95,10 @@ HONEST_S: Final = 120.0
 """How long an honest drive lasts at most."""
 BUMPER: Final = "bumper contact"
 """A stop with this reason names no lie."""
-CORRIDOR_M: Final = (0.7, 1.6)
-"""Free width of a corridor beside the robot, m."""
-CORRIDOR_LENGTH_M: Final = 9.0
-TILT_RAD: Final = math.radians(8.0)
-"""Greatest angle between a corridor and the robot's first heading."""
 
 
 Plan: TypeAlias = tuple[str, str, str | None, int, int]
 """Robot, room, kind, seed and moment of a trial."""
-
-
-class Drive(NamedTuple):
-    """What is driven where."""
-
-    settings: Settings
-    world: WorldConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,75 +150,6 @@ class TrialResult:
     def is_contact(self) -> bool:
         """Whether it touched something at speed."""
         return self.contact_m_s > AT_SPEED_M_S
-
-
-def make_drive(robot: str, room: str, seed: int) -> Drive:
-    """Return a drive: shipped runs and missions in the shipped worlds, or a generated world.
-
-    Parameters
-    ----------
-    robot
-        A shipped robot file, or one of `RINGS`.
-    room
-        One of `ROOMS`.
-    seed
-        Of a generated world, and of a mission's schemas.
-    """
-    if room in {"office", "hallway"}:
-        settings = _settings(room, robot)
-        assert settings.world is not None
-        return Drive(settings, settings.world)
-    if room == "corridor":
-        settings = _settings("room", robot, "behaviors.move_ahead.distance_m=30.0")
-        return Drive(settings, _corridor(settings.body.radius_m, seed))
-    if room == "goal":
-        world = _furnished(seed, _settings("room", robot).body.radius_m)
-        goal = _goal(seed, world)
-        return Drive(_settings("office", robot, f"goal={{x_m={goal.x:.2f}, y_m={goal.y:.2f}}}"), world)
-    settings = _settings("room", robot, mission="wander")
-    assert settings.world is not None
-    return Drive(settings, settings.world if room == "room" else _furnished(seed, settings.body.radius_m))
-
-
-def _settings(run: str, robot: str, *sets: str, mission: str | None = None) -> Settings:
-    """Return the settings of a shipped run with a shipped robot, or with one of `RINGS`."""
-    if robot in RINGS:
-        return with_ring(load_settings(run, sets, robot="denning", mission=mission), robot)
-    return load_settings(run, sets, robot=robot, mission=mission)
-
-
-def _furnished(seed: int, radius_m: float) -> WorldConfig:
-    """Return a furnished room with a start that is clear of everything."""
-    room, rng = furnished_room(seed), np.random.default_rng([seed, 38])
-    scene = compile_scene(room.world)
-    x = y = 0.0
-    for _ in range(200):
-        x, y = room.place(*rng.uniform(-0.4, 0.4, 2).tolist())
-        if clearance(x, y, scene.circles, scene.segments) > radius_m + 0.25:
-            break
-    start = StartConfig(x_m=x, y_m=y, heading_deg=float(rng.uniform(-180.0, 180.0)))
-    return room.world.model_copy(update={"start": start})
-
-
-def _goal(seed: int, world: WorldConfig) -> Pose:
-    """Return a place in the room, in odometry's frame."""
-    room, rng = furnished_room(seed), np.random.default_rng([seed, 39])
-    start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
-    there = max((room.place(*rng.uniform(-0.35, 0.35, 2).tolist()) for _ in range(4)),
-                key=lambda place: math.dist(place, (start.x, start.y)))  # fmt: skip
-    return start.inverse().compose(Pose(*there, 0.0))
-
-
-def _corridor(radius_m: float, seed: int) -> WorldConfig:
-    rng = np.random.default_rng([seed, 40])
-    half, length = radius_m + 0.5 * float(rng.uniform(*CORRIDOR_M)), CORRIDOR_LENGTH_M
-    corners = [(-1.5, -half), (length, -half), (length, half), (-1.5, half)]
-    walls = tuple(
-        WallConfig(x1_m=a[0], y1_m=a[1], x2_m=b[0], y2_m=b[1])
-        for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)
-    )
-    tilt_deg = math.degrees(float(rng.uniform(-TILT_RAD, TILT_RAD)))
-    return WorldConfig(wall=walls, acoustics=ACOUSTICS, start=StartConfig(x_m=0.0, y_m=0.0, heading_deg=tilt_deg))
 
 
 def make_lie(kind: str, settings: Settings, begin_s: float) -> Fault:
@@ -316,11 +228,8 @@ def run_trial(
             if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and not str(state.mode.reason).startswith(BUMPER):
                 texts.append(str(state.mode.reason))
             held = held if state.hold_reason == held else None
-            if (
-                kind is not None
-                and held is None
-                and (state.hold_reason in HELD or (state.hold_reason == DOUBTED and kind.startswith("turned")))
-            ):
+            names = HELD if kind is None or not kind.startswith("turned") else {*HELD, DOUBTED}
+            if kind is not None and held is None and state.hold_reason in names:
                 texts.append(str(state.hold_reason))
             if texts:
                 named_s, said = run_s - begin_s, texts[-1]
@@ -348,7 +257,7 @@ def trials(
 ) -> Iterator[Plan]:
     """Yield the arguments of each trial, without errors of clocks, or of two sensors, that a robot does not have."""
     for robot in robots:
-        settings = _settings("room", robot)
+        settings = drive_settings("room", robot)
         stamped, has_two = settings.robot.driver != "arcos", settings.ring.sensor_count > 1
         for room, seed, moment in product(rooms, seeds, range(moments)):
             for kind in kinds:

@@ -9,7 +9,8 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from tests.promises import LIMITS, PROMISES, PromiseTest, Results
+from tests.promise_limits import LIMITS
+from tests.promises import PROMISES, PromiseTest, Results
 
 NO_PROMISE = "–"
 """Stands for an ID in rows of tests without one."""

@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 import pytest
 
-from bench.lies import honest, make_drive, measure
+from bench.lies import honest, measure
 from bench.sparse_rings import RADIUS_M, RINGS
+from bench.trials.room_drives import make_drive
 from runtime.support.blind_sides import blind_sides_deg
 from runtime.support.pattern_check import pattern_speed_m_s, refuse_undrivable
 

@@ -19,6 +19,7 @@ const HINTS = {
 
 export class PlacesPanel extends Panel {
   #shown = "";
+  #filled = "";
 
   /** @param {Panels & Pick<Parts, "places" | "tools"> & { tool: PlacesTool }} parts */
   constructor(parts) {
@@ -131,7 +132,10 @@ export class PlacesPanel extends Panel {
     disable([byId("places-draw"), byId("places-undo"), byId("places-file")], !enabled);
     const row = selected === null ? null : all[selected[0]][selected[1]];
     byId("places-form").hidden = !row;
-    if (row) this.#fill(row);
+    // What is being typed stays while only something else has changed.
+    const filled = row ? JSON.stringify([selected, row, units.name]) : "";
+    if (row && filled !== this.#filled) this.#fill(row);
+    this.#filled = filled;
     if (focused && document.activeElement?.id !== focused) document.getElementById(focused)?.focus();
   }
 
