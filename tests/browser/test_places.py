@@ -110,6 +110,9 @@ async def operate(case: ConsoleCase, opener: Opener, folder: Path) -> None:
     await opened.save_screenshot("places")
 
     await page.locator("#places-name").fill("A name")
+    for kind in ("no_go_line", "place"):  # each shows the form again
+        await page.locator("#places-kind").select_option(kind)
+    await expect(page.locator("#places-name")).to_have_value("A name")
     await page.locator("#places-name").press("Enter")
     await opened.says("#places-error", "small letters")
     await page.locator("#places-row-no_go_line-0").click()
