@@ -23,14 +23,15 @@ from runtime.cycle.connection import POLL_S, Connection
 
 ANSWER_MAX_S: Final = 3.0
 """Longest wait for a robot's first frame, s: as long as it takes to call a Pioneer at every speed of its line."""
-SOCKET_MAX_S: Final = 4.2
-"""Longest wait for first frames over a network, of all families, s: nothing is lost there, and it has no speeds."""
+SOCKET_MAX_S: Final = 3.9
+"""Longest wait for first frames over a network, of all families, s: nothing is lost there, and it has no speeds. A
+third is the time to listen to a Pioneer's line and to wait for the answer to its first SYNC."""
 AGAIN_MAX_S: Final = 3.0
 """Longest wait until a port that was just given up can be opened again, s: a server of one client is still busy."""
 READY_MAX_S: Final = 6.0
 """Longest wait from the first frame until the robot is ready, s."""
 LOOK_S: Final = 1.0
-"""How long a robot that is ready is listened to, for its sensors and its state, s."""
+"""Longest time to listen to a robot that is ready, for its sensors and its state, s; less if all have fired."""
 NOTHING: Final = "nothing answers: is the robot on, and is this its cable?"
 NO_FRAME: Final = (
     "no robot answers, and what is received is no frame of a known robot; another device is on this port, or one of "
@@ -54,6 +55,14 @@ class Finding(NamedTuple):
     """The robot in words, or why there is none."""
 
 
+class _Event(NamedTuple):
+    """One moment of a line, for the driver of another file."""
+
+    at_s: float
+    data: bytes | None
+    """What was received; None where the driver was asked what to send."""
+
+
 class _Answer(NamedTuple):
     """What the driver of one robot found out."""
 
@@ -71,6 +80,8 @@ class _Answer(NamedTuple):
     """Whether all have."""
     is_other: bool = False
     """Whether the robot has said what it is, so that another file of its family may be its own."""
+    events: tuple[_Event, ...] = ()
+    """What was received, and when the line was looked after."""
 
 
 async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
@@ -95,8 +106,10 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
     families = [list(ones) for _, ones in itertools.groupby(sorted(robots.items(), key=key), key=key)]
     answer_max_s = min(ANSWER_MAX_S, SOCKET_MAX_S / len(families)) if is_socket else ANSWER_MAX_S
     for family in families:
+        events = tuple[_Event, ...]()
         for name, config in family:
-            answer = await _try(port, config, answer_max_s, again=next(tries) > 0)
+            answer = _heard_as(config, events) or await _try(port, config, answer_max_s, again=next(tries) > 0)
+            events = answer.events
             if answer.text is not None:
                 if best[1].robot is None or answer.fired > best[0]:
                     best = (answer.fired, Finding(name, (answer.text,)))
@@ -144,49 +157,132 @@ async def _try(port: str, config: RobotConfig, answer_max_s: float, *, again: bo
         Whether the port was open just before.
     """
     config = config.model_copy(update={"link": config.link.model_copy(update={"port": port})})
-    driver, clock, heard = make_driver(config), time.monotonic, HeardBytes()
-    heard.find_robot = partial(other_robot, config.robot.driver)
+    listener, clock, heard = _Listener(config, answer_max_s), time.monotonic, HeardBytes()
+    driver, heard.find_robot = listener.driver, partial(other_robot, config.robot.driver)
 
     def send() -> None:
         link.set_baud(driver.line_baud)
-        if link.is_open and (data := driver.outgoing(writable=link.writable)):
+        if link.is_open and (data := listener.sent(clock(), writable=link.writable)):
             heard.sent(data)
             link.send(data)
 
     def opened() -> None:
-        driver.line_opened(clock())
+        listener.opened(clock())
         send()
 
     def received(data: bytes) -> None:
         heard.received(data)
-        driver.receive(data, clock())
+        listener.received(data, clock())
 
     link = Link(config.link, opened, received, lambda _reason: driver.line_closed(), **line_options(config))
     try:
         await _open(link, AGAIN_MAX_S if again else 0.0, clock)
     except LinkError as error:
         return _Answer(has_answered=False, problem=str(error))
-    connection, begin_s = Connection(link, driver, send, clock, config.body), clock()
     try:
-        while driver.state is not LineState.READY and link.is_open:
-            driver.tick(clock())
+        while link.is_open:
             send()
-            has_answered = driver.counts.frames > 0
-            if driver.state is LineState.DOWN and has_answered:
-                return _Answer(has_answered=True, problem=driver.problem, is_other=_is_other(driver))
-            if has_answered and clock() - begin_s > READY_MAX_S:
-                problem = driver.problem or UNREADY
-                return _Answer(has_answered=True, problem=problem, is_other=_is_other(driver))
-            if not has_answered and clock() - begin_s > answer_max_s:
-                return _Answer(has_answered=False, stranger=heard.stranger or NO_FRAME if heard.total else None)
+            if (answer := listener.found(clock())) is not None:
+                stranger = None if answer.has_answered or not heard.total else heard.stranger or NO_FRAME
+                return answer._replace(stranger=stranger, events=tuple(listener.events))
             await asyncio.sleep(POLL_S)
-        if not link.is_open:
-            return _Answer(has_answered=False, problem=link.last_error)
-        return await _look(connection)
+        return listener.look(clock()) if listener.is_ready else _Answer(has_answered=False, problem=link.last_error)
     finally:
         if driver.state is LineState.READY:
-            await connection.shut_down()
+            await Connection(link, driver, send, clock, config.body).shut_down()
         await link.stop()
+
+
+def _heard_as(config: RobotConfig, events: tuple[_Event, ...]) -> _Answer | None:
+    """Return what the driver of another file makes of what was received as a file of its family; None if nothing.
+
+    A robot that says what it is, or one whose controller reports unasked, need not be called once more.
+    """
+    if not events:
+        return None
+    listener = _Listener(config, math.inf)
+    listener.opened(events[0].at_s)
+    answer = None
+    for at_s, data in events:
+        if data is None:
+            listener.sent(at_s, writable=True)
+            answer = listener.found(at_s)
+        else:
+            listener.received(data, at_s)
+        if answer is not None:
+            break
+    return answer if answer is None else answer._replace(events=events)
+
+
+class _Listener:
+    """The driver of one robot on a line, and what it finds out.
+
+    Attributes
+    ----------
+    driver
+        The driver.
+    events
+        What was received, and when the driver was asked what to send.
+    """
+
+    def __init__(self, config: RobotConfig, answer_max_s: float) -> None:
+        self.driver, self._answer_max_s = make_driver(config), answer_max_s
+        self.events: list[_Event] = []
+        self._begin_s = 0.0
+        self._ready_s = math.inf
+        """When the robot was ready, s; inf before."""
+        self._flags, self._fired, self._echoed = Flags.NONE, set[int](), set[int]()
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether the robot was ready."""
+        return math.isfinite(self._ready_s)
+
+    def opened(self, at_s: float) -> None:
+        """Begin on a line that was just opened."""
+        self._begin_s = at_s
+        self.driver.line_opened(at_s)
+
+    def received(self, data: bytes, at_s: float) -> None:
+        """Take bytes from the line."""
+        self.events.append(_Event(at_s, data))
+        self.driver.receive(data, at_s)
+
+    def sent(self, at_s: float, *, writable: bool) -> bytes:
+        """Let time pass; return what is to be sent, and consider it sent."""
+        self.events.append(_Event(at_s, None))
+        self.driver.tick(at_s)
+        return self.driver.outgoing(writable=writable)
+
+    def found(self, at_s: float) -> _Answer | None:
+        """Return what was found out; None as long as more may come."""
+        driver = self.driver
+        has_answered, waited_s = driver.counts.frames > 0, at_s - self._begin_s
+        if driver.state is LineState.READY:
+            self._ready_s = min(self._ready_s, at_s)
+        if self.is_ready:
+            answer = self.look(at_s)
+            return answer if answer.is_whole or at_s - self._ready_s >= LOOK_S else None
+        if has_answered and (driver.state is LineState.DOWN or waited_s > READY_MAX_S):
+            return _Answer(has_answered=True, problem=driver.problem or UNREADY, is_other=_is_other(driver))
+        if not has_answered and waited_s > self._answer_max_s:
+            return _Answer(has_answered=False)
+        return None
+
+    def look(self, at_s: float) -> _Answer:
+        """Return what a robot that is ready has said up to now."""
+        received, identity = self.driver.take_received(), self.driver.identity
+        self._flags |= received.flags
+        for firing in received.firings:
+            self._fired |= set(np.flatnonzero(~np.isnan(firing.ranges_m)).tolist())
+            self._echoed |= set(np.flatnonzero(np.isfinite(firing.ranges_m)).tolist())
+        fired, echoed, flags = len(self._fired), len(self._echoed), self._flags
+        robot = "a robot" if identity is None else f"{_name(identity)}, {identity.sensors} sensors"
+        within = f"within {at_s - self._ready_s:.1f} s {fired} have fired and {echoed} have heard something"
+        battery = _battery(self.driver.battery_v, is_low=Flags.BATTERY_LOW in flags)
+        text = "; ".join([robot, battery, within, *(warning for flag, warning in WARNINGS if flag in flags)])
+        count = math.inf if identity is None else identity.sensors
+        return _Answer(has_answered=True, text=text, fired=fired, is_whole=fired >= count)
 
 
 def _is_other(driver: RobotDriver) -> bool:
@@ -212,29 +308,6 @@ async def _open(link: Link, tries_s: float, clock: Callable[[], float]) -> None:
         else:
             return
         await asyncio.sleep(POLL_S)
-
-
-async def _look(connection: Connection) -> _Answer:
-    """Return what a robot that is ready says, after listening to it for a while."""
-    driver, clock = connection.driver, connection.clock
-    flags, fired, heard = Flags.NONE, set[int](), set[int]()
-    end_s = clock() + LOOK_S
-    while clock() < end_s and connection.link.is_open:
-        driver.tick(clock())
-        connection.send()
-        received = driver.take_received()
-        flags |= received.flags
-        for firing in received.firings:
-            fired |= set(np.flatnonzero(~np.isnan(firing.ranges_m)).tolist())
-            heard |= set(np.flatnonzero(np.isfinite(firing.ranges_m)).tolist())
-        await asyncio.sleep(POLL_S)
-    identity = driver.identity
-    robot = "a robot" if identity is None else f"{_name(identity)}, {identity.sensors} sensors"
-    within = f"within {LOOK_S:g} s {len(fired)} have fired and {len(heard)} have heard something"
-    battery = _battery(driver.battery_v, is_low=Flags.BATTERY_LOW in flags)
-    text = "; ".join([robot, battery, within, *(warning for flag, warning in WARNINGS if flag in flags)])
-    count = math.inf if identity is None else identity.sensors
-    return _Answer(has_answered=True, text=text, fired=len(fired), is_whole=len(fired) >= count)
 
 
 def _battery(volts: float | None, *, is_low: bool) -> str:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from config.files import list_shipped
 from config.load import load_robot
 from config.robot import CalibrationConfig, RobotConfig
+from config.world import WorldConfig
 from drivers.calibrated_driver import CalibratedDriver
 from drivers.driver import LineState
 from drivers.link import Link, LinkError
 from drivers.messages import LinkCounts
+from drivers.registry import make_device
 from runtime.cli.commands.robots import port_probe
 from tests.hil.machine import TIMEOUT_S
 
@@ -118,7 +123,7 @@ async def test_what_has_answered_and_is_not_ready_is_said_also_behind_a_calibrat
     monkeypatch.setattr(Link, "open_once", open_once)
     monkeypatch.setattr(Link, "is_open", True)
     found = await port_probe._try("socket://localhost:1", load_robot("p3dx"), 0.0)
-    assert found == port_probe._Answer(has_answered=True, problem=answer[0], is_other=answer[1])
+    assert found._replace(events=()) == port_probe._Answer(has_answered=True, problem=answer[0], is_other=answer[1])
 
 
 async def test_a_socket_has_no_speeds_so_that_its_families_are_those_of_the_drivers(
@@ -164,3 +169,54 @@ async def test_a_port_that_is_still_busy_with_the_robot_tried_before_is_opened_a
 def test_a_battery_that_is_low_is_named_with_and_without_its_voltage() -> None:
     assert port_probe._battery(10.94, is_low=True) == "battery 10.9 V, low"
     assert port_probe._battery(None, is_low=True) == "battery low"
+
+
+class Line:
+    """Connections to an emulated robot, one after the other, in virtual time."""
+
+    is_open, writable, last_error = False, True, None
+
+    def __init__(self, robot: str) -> None:
+        self.device = make_device(load_robot(robot), WorldConfig(), seed=1)
+        self.now_s, self.opened = 0.0, 0
+
+    def __call__(self, config: Any, opened: Any, received: Any, _closed: Any) -> Line:
+        self.config, self._when_opened, self._when_received = config, opened, received
+        return self
+
+    def set_baud(self, baud: int | None) -> None: ...
+
+    async def open_once(self) -> None:
+        self.is_open, self.opened = True, self.opened + 1
+        self._when_opened()
+
+    async def stop(self) -> None:
+        self.is_open = False
+
+    def send(self, data: bytes) -> None:
+        self.device.receive(data)
+
+    async def sleep(self, seconds: float) -> None:
+        self.now_s += seconds
+        data = self.device.advance(self.now_s)
+        if self.is_open and data:
+            self._when_received(data)
+
+
+@pytest.mark.parametrize("robot", list_shipped("robots"))
+async def test_a_robot_on_the_network_is_found_within_four_seconds_and_its_family_called_twice_at_most(
+    robot: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The time is that of the waits, counted: a busy machine adds its own."""
+    line = Line(robot)
+    monkeypatch.setattr(port_probe, "Link", line)
+    monkeypatch.setattr(port_probe, "time", SimpleNamespace(monotonic=lambda: line.now_s))
+    monkeypatch.setattr(asyncio, "sleep", line.sleep)
+    robots = {name: load_robot(name) for name in list_shipped("robots")}
+    found = await port_probe.probe_port("socket://localhost:1", robots)
+    assert found.robot == {"ears": "denning", "b21r-both": "b21r"}.get(robot, robot), (
+        "the first whose sensors all fire"
+    )
+    assert line.now_s <= 4.0
+    driver = robots[robot].robot.driver
+    assert line.opened <= {"arcos": 2, "denning": 3, "rflex": 3}[driver], f"one of each family before {driver}"
