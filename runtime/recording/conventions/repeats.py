@@ -21,6 +21,8 @@ RUNS_NAT: Final = 12.0
 """By how much rarer runs of changes are than those of a fresh source would be."""
 GLITCHES: Final = 0.02
 """Share of runs that may contradict: rows at uneven times."""
+LONGEST_RUN: Final = 24
+"""Longest run of changes whose end is looked for: of a source that repeats less than that, hardly a value is old."""
 ROWS_MIN: Final = 30
 REPEATED: Final = 0.3
 """Share of repeats, as the robot moves, from which a log that shows nothing else is ambiguous: ranges to the
@@ -43,7 +45,7 @@ class Repeats(NamedTuple):
         """What was found."""
         noise = f", give or take {self.same:.2g} in the file's unit" if self.same else ""
         return (
-            f"each value is repeated{noise}, for {self.rows:g} rows mostly, until its sensor fires again: only "
+            f"each value is repeated{noise}, for {self.rows:.3g} rows mostly, until its sensor fires again: only "
             "changes are readings"
         )
 
@@ -102,7 +104,38 @@ def _repeats(ranges: Floats) -> Repeats:
         expected = float((count * changed.mean(axis=0) ** 2).sum())
         if runs <= GLITCHES * count.sum() and expected - runs > RUNS_NAT:
             return Repeats(1.5, same)  # each value stands for one row or two: no sensor changes three times in a row
+        if longest := _longest_run(held, changed, great):
+            return Repeats((longest + 1) / longest, same)
     return Repeats()
+
+
+def _longest_run(ranges: Floats, changed: NDArray[np.bool_], great: NDArray[np.bool_]) -> int:
+    """Return how often in a row a sensor changes at most, where that ends all at once; 0 where it does not.
+
+    Rows that come a little faster than the ring's cycle repeat one value in a few, and always after as many changes.
+    In a fresh source runs go on from each length with nearly the same chance.
+
+    Parameters
+    ----------
+    ranges
+        Shape (n, sensors).
+    changed, great
+        As of `_changes`.
+    """
+    known = np.isfinite(ranges[1:]) & np.isfinite(ranges[:-1])
+    runs = great & known
+    follows = runs[:-1] & known[1:]
+    goes_on = (follows & changed[1:]).sum(axis=0) / np.maximum(1, follows.sum(axis=0))
+    for length in range(1, LONGEST_RUN):
+        if len(runs) <= length:
+            break
+        runs = runs[:-1] & known[length:]
+        count = runs.sum(axis=0)  # the runs of each sensor that are as long as this, before a known value
+        runs = runs & changed[length:]
+        longer = int(runs.sum())
+        if length > 2 and longer <= GLITCHES * count.sum() and float((count * goes_on).sum()) - longer > RUNS_NAT:
+            return length
+    return 0
 
 
 def _least_change(ranges: Floats) -> float:

@@ -34,6 +34,15 @@ def test_last_values_are_found_and_firings_are_fresh(robot: str, world: str, lea
     assert repeats(latched(drive)) >= least
 
 
+@pytest.mark.parametrize("robot", ["p3dx", "magellan"])
+@pytest.mark.parametrize("share", [1.25, 1.2, 1.1])
+def test_rows_a_little_faster_than_the_ring_repeat_one_value_in_a_few(robot: str, share: float) -> None:
+    drive = make_drive(3, robot, "room", "cone")
+    cycle_s = firing_pattern(drive.settings.ring).cycle_s
+    assert repeats(latched(drive, cycle_s / share)) == pytest.approx(share, abs=0.01)
+    assert repeats(latched(drive, cycle_s * share)) == 1.0, "each row has new values"
+
+
 def test_a_table_that_shows_too_little_is_refused_with_the_option() -> None:
     with pytest.raises(RingLogError, match="say --latched yes if"):
         repeats(latched(make_drive(3, "denning", "hall", "cone"), 0.2))
