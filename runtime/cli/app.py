@@ -126,7 +126,13 @@ def main(arguments: list[str] | None = None) -> None:
             code = run_command(sys.argv[1:] if arguments is None else arguments)
     except ReaderGoneError:
         code = DONE
-    sys.exit(code)
+    except SystemExit as ended:
+        if not isinstance(ended.code, int):
+            raise
+        code = ended.code
+    from runtime.support.daemon_thread import exit_process
+
+    exit_process(code)
 
 
 def run_command(arguments: list[str]) -> int:

@@ -16,6 +16,7 @@ from config.settings import Settings
 from perception.pipeline import Perception
 from runtime.cycle.drive_requests import first_request
 from runtime.cycle.step import State
+from runtime.support.daemon_thread import in_daemon_thread
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
@@ -91,7 +92,7 @@ class RunningPreparation:
         log: FilteringBoundLogger,
         on_ready: Callable[[], None],
         on_starting: Callable[[str], None] | None = None,
-        in_thread: InThread = asyncio.to_thread,
+        in_thread: InThread = in_daemon_thread,
         perception: Perception | None = None,
     ) -> None:
         self._preparation = preparation

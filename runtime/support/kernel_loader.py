@@ -20,6 +20,7 @@ from config.errors import FAILED, UserError
 from config.files import one_line
 from config.settings import Settings
 from runtime.support.child_process import kill_child, start_child
+from runtime.support.daemon_thread import in_daemon_thread
 from runtime.support.kernel_cache import (
     BAYES,
     COMPILED_SUFFIX,
@@ -87,7 +88,7 @@ FIRST_START: Final = (
 
 
 class InThread(Protocol):
-    """Calls a function in another thread, as `asyncio.to_thread` does; see `runtime.timing.cycle_gaps`."""
+    """Calls a function in another thread, as `in_daemon_thread` does; see `runtime.timing.cycle_gaps`."""
 
     async def __call__(self, call: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Return what the call returns."""
@@ -143,7 +144,7 @@ class KernelLoader:
                     f"or time: start with {start}"
                 )
             before = compiled_signatures()
-            await asyncio.to_thread(warm_up, proposed, parts)
+            await in_daemon_thread(warm_up, proposed, parts)
             self.loaded += compiled_signatures() - before
         return None
 
@@ -190,7 +191,7 @@ class KernelPreparation:
     def begin_ring(self, settings: Settings) -> asyncio.Task[None]:
         """Begin to load what `ring` waits for, and return the task; it is started only once."""
         if self._ring is None:
-            loading = asyncio.to_thread(self._compile_ring, settings)
+            loading = in_daemon_thread(self._compile_ring, settings)
             self._ring = asyncio.create_task(loading, name="kernels of the ring")
         return self._ring
 
@@ -217,7 +218,7 @@ class KernelPreparation:
         await self.begin_ring(settings)
         self.progress = PREPARING
 
-    async def __call__(self, settings: Settings, in_thread: InThread = asyncio.to_thread) -> PreparedRecognition:
+    async def __call__(self, settings: Settings, in_thread: InThread = in_daemon_thread) -> PreparedRecognition:
         """Return what recognition begins with, when no kernel of the other parts is left to compile or to load.
 
         Both are loaded and made in threads of `in_thread`.

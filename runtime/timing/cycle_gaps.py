@@ -8,13 +8,14 @@ the cycles among them (a median of 207 µs became 553 µs): there the threads wo
 
 from __future__ import annotations
 
-import asyncio
 import math
 import sys
 import threading
 import time
 from collections.abc import Callable
 from typing import Final, ParamSpec, TypeVar
+
+from runtime.support.daemon_thread import in_daemon_thread
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -66,7 +67,7 @@ class CycleGaps:
     async def to_thread(self, call: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Call a function in a thread that rests in cycles, and return what it returns."""
         if not IS_TRACED:
-            return await asyncio.to_thread(call, *args, **kwargs)
+            return await in_daemon_thread(call, *args, **kwargs)
 
         def resting() -> R:
             before = sys.gettrace()
@@ -78,7 +79,7 @@ class CycleGaps:
 
         self._threads += 1
         try:
-            return await asyncio.to_thread(resting)
+            return await in_daemon_thread(resting)
         finally:
             self._threads -= 1
 

@@ -285,6 +285,7 @@ async def _whole_run(
     from runtime.cli.__main__ import main
     from runtime.cli.start_signals import ending_the_start
     from runtime.simulation.emulator_process import start_emulator
+    from runtime.support.daemon_thread import in_daemon_thread
     from runtime.support.kernel_cache import EMULATOR, is_compiled
     from runtime.support.logs import open_log
     from runtime.timing.run_clock import ScaledClock
@@ -299,8 +300,8 @@ async def _whole_run(
             emulator_start = asyncio.create_task(running.enter_async_context(starting), name="emulator")
             running.push_async_callback(_end_task, emulator_start)
         if settings.console.enabled:  # meanwhile: it reads certificates, for which it needs no interpreter
-            http = asyncio.create_task(asyncio.to_thread(_import_http), name="import of HTTP")
-            running.push_async_callback(asyncio.wait, [http])
+            http = asyncio.create_task(in_daemon_thread(_import_http), name="import of HTTP")
+            running.callback(http.cancel)
         await asyncio.sleep(0.0)
         view: View | None = None
         if console is not None:
@@ -334,7 +335,7 @@ async def _whole_run(
             log.info("serial port found", ports=plugged, hint=f"this run is emulated; {runs}")
         control: TimeControl = NoTimeControl()
         line_messages = messages_on(settings.link.port)
-        importing = asyncio.create_task(asyncio.to_thread(import_rest, emulated=plan.emulated))
+        importing = asyncio.create_task(in_daemon_thread(import_rest, emulated=plan.emulated))
         if preparation is not None:
             running.push_async_callback(preparation.close)
             if preparation.first_start is not None:

@@ -6,11 +6,13 @@ import contextlib
 import signal
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
+from config.errors import UserError
 from runtime.cli.commands.foxglove import foxglove_beside
 from runtime.cli.commands.run.run_recording import RunRecording
-from runtime.cli.first_signals import is_remembered
+from runtime.cli.first_signals import EXIT_CODE_BASE, is_remembered
 from runtime.cli.start_signals import handled_by_loop
 from runtime.support.kernel_loader import KernelPreparation
 from runtime.support.sd_notify import SdNotifier
@@ -148,7 +150,7 @@ async def run_process(
                 for line in page.hints():
                     view.print(line)
                 view.console_url = page.url
-        stack.enter_context(signals(process, reloader))
+        ending = stack.enter_context(signals(process, reloader))
         if view is not None:
             view.is_paused = lambda: control.is_paused
             plan.clock.on_change(view.draw_again)
@@ -158,22 +160,34 @@ async def run_process(
         for name, probe in {"recorder": recording.probe, "log": log_status.probe, "reload": reloader.probe}.items():
             process.health.watch(name, probe)
         summary = await process.run(arm=plan.is_armed, seconds=plan.seconds)
+        if not summary["cycles"]:
+            why = "ended{} before the robot was ready"
+            if ending:
+                raise UserError(why.format(f" by {ending[0].name}"), EXIT_CODE_BASE + ending[0])
+            summary["stop_reasons"].append(why.format(""))
         summary["process"]["compilations"] -= kernel_loader.loaded  # they delayed no cycle
         return summary
 
 
 @contextlib.contextmanager
-def signals(process: RobotProcess, reloader: Reloader) -> Iterator[None]:
+def signals(process: RobotProcess, reloader: Reloader) -> Iterator[list[signal.Signals]]:
     """Handle signals during a run: INT and TERM end it, USR1 arms the robot, USR2 halts it, HUP reloads the settings.
 
+    The list has those that ended the run, once they come.
     A USR2 that came during the start halts the robot before its first cycle, so that it is not armed by itself.
     If the reloaded configuration is wrong, the errors go to the log and the settings in force remain.
     """
     from runtime.cycle.inputs import Request
 
+    ending: list[signal.Signals] = []
+
+    def end(number: signal.Signals) -> None:
+        ending.append(number)
+        process.stop()
+
     handlers: dict[signal.Signals, Callable[[], None]] = {
-        signal.SIGINT: process.stop,
-        signal.SIGTERM: process.stop,
+        signal.SIGINT: partial(end, signal.SIGINT),
+        signal.SIGTERM: partial(end, signal.SIGTERM),
         signal.SIGUSR1: lambda: process.request(Request.ARM),
         signal.SIGUSR2: lambda: process.request(Request.HALT),
         signal.SIGHUP: reloader.request,
@@ -183,6 +197,6 @@ def signals(process: RobotProcess, reloader: Reloader) -> Iterator[None]:
         if is_remembered(halting):
             process.request(Request.HALT)
         try:
-            yield
+            yield ending
         finally:
             reloader.cancel()

@@ -60,10 +60,11 @@ async def test_signals_are_requests_while_the_run_lasts() -> None:
         signal.SIGUSR2: Request.HALT,
         signal.SIGHUP: "reload",
     }
-    with signals(process, reloader):  # type: ignore[arg-type]
+    with signals(process, reloader) as ending:  # type: ignore[arg-type]
         for number, asked in expected.items():
             signal.raise_signal(number)
             assert await asyncio.wait_for(process.asked.get(), TIMEOUT_S) == asked
+    assert ending == [signal.SIGINT, signal.SIGTERM]
     assert reloader.is_cancelled
     for number in ENDING:
         with pytest.raises(SystemExit) as ended:  # a second one ends an end that takes long
