@@ -38,7 +38,7 @@ async def in_daemon_thread(call: Callable[P, R], /, *args: P.args, **kwargs: P.k
         outcome: Callable[[], None]
         try:
             outcome = partial(future.set_result, context.run(call, *args, **kwargs))
-        except BaseException as error:  # noqa: BLE001 - whoever waits gets it, whatever it is
+        except BaseException as error:  # noqa: BLE001 - what waits for it gets it, whatever it is
             outcome = partial(future.set_exception, error)
         with contextlib.suppress(RuntimeError):  # the loop is closed
             loop.call_soon_threadsafe(settle, outcome)
@@ -55,7 +55,7 @@ def exit_process(code: int) -> NoReturn:
     if any(thread.name == NAME for thread in threading.enumerate()):
         atexit._run_exitfuncs()
         for stream in (sys.stdout, sys.stderr):
-            with contextlib.suppress(OSError, ValueError):  # nobody reads it any more
+            with contextlib.suppress(OSError, ValueError):  # it may be closed
                 stream.flush()
         os._exit(code)
     sys.exit(code)

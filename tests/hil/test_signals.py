@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import signal
 import socket
 import threading
+import tty
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,8 +24,9 @@ from runtime.cli.app import run_command
 from runtime.recording.channels import LOG, SERIAL, SETTINGS, decode
 from runtime.recording.reader import open_recording
 from runtime.recording.schema import LogLine, SerialBytes
+from tests.hil.machine import stalls_excused
 from tests.hil.planted import planted
-from tests.hil.running import PATIENT, Running, emulated, wait_for
+from tests.hil.running import PATIENT, Running, emulated, running, wait_for
 from tests.hil.test_long_runs import WRAP_S
 from tests.hil.test_stops_by_itself import Drive
 from tests.hil.truth import DRIVING_M_S, Truth
@@ -164,3 +167,21 @@ def check_recording(recorded: Path) -> None:
         pieces = [p for e in entries if e.topic == SERIAL[way] for p in decode(SerialBytes, e.data).pieces()]
         assert sum(len(data) for _, data in pieces) > 0
         assert [t for t, _ in pieces] == sorted(t for t, _ in pieces)
+
+
+@stalls_excused
+def test_a_run_that_is_ended_before_its_robot_is_ready_says_so_and_by_which_signal(tmp_path: Path) -> None:
+    robot, line = os.openpty()
+    tty.setraw(line)
+    summary = tmp_path / "summary.json"
+    with running(
+        tmp_path, "run", "run", "--port", os.ttyname(line), "--json", str(summary), "--no-record", "--no-console"
+    ) as run:
+        assert os.read(robot, 1), "it calls the robot, which does not answer"
+        run.signal(signal.SIGINT)
+        assert run.end() == 128 + signal.SIGINT
+    os.close(line)
+    os.close(robot)
+    (reason,) = json.loads(summary.read_bytes())["stop_reasons"]
+    assert reason == "ended by SIGINT before the robot was ready"
+    assert run.error_lines == [f"echolocate: {reason}"]
