@@ -76,6 +76,11 @@ def explain(config: LinkConfig, error: BaseException) -> str:
     number = getattr(error, "errno", None)
     text = " ".join(str(error).split())
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR):
+        if port is not None and "://" in port:
+            return (
+                f"{port}: no such kind of port; give a serial device, or socket://host:port of a server that passes "
+                "bytes on as they are (ser2net: raw)"
+            )
         return (
             f"no such port {port}; likely the robot is not plugged in or the name is another: look for it with "
             f"`ls /dev/tty* /dev/serial/by-id`, and name that one"

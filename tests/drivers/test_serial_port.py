@@ -82,3 +82,8 @@ def test_each_cause_has_its_line(error: Exception, text: str) -> None:
     line = explain(LinkConfig(port="/dev/robot"), error)
     assert text in line
     assert "\n" not in line
+
+
+def test_an_address_of_another_kind_is_no_missing_device() -> None:
+    line = explain(LinkConfig(port="rfc2217://host:4000"), FileNotFoundError(errno.ENOENT, "No such file"))
+    assert line.startswith("rfc2217://host:4000: no such kind of port; give a serial device, or socket://host:port")

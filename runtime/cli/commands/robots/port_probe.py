@@ -37,6 +37,10 @@ NO_FRAME: Final = (
     "no robot answers, and what is received is no frame of a known robot; another device is on this port, or one of "
     "another speed: name its file with --robot"
 )
+ENDED: Final = (
+    "{}: its other end ends the connection before a robot answers; likely it is another program's port, or serves "
+    "one client at a time: give the robot's port, or end the other client"
+)
 UNREADY: Final = (
     "it answers, but does not finish the handshake: restart the robot, and check its cable in both directions"
 )
@@ -186,7 +190,10 @@ async def _try(port: str, config: RobotConfig, answer_max_s: float, *, again: bo
                 stranger = None if answer.has_answered or not heard.total else heard.stranger or NO_FRAME
                 return answer._replace(stranger=stranger, events=tuple(listener.events))
             await asyncio.sleep(POLL_S)
-        return listener.look(clock()) if listener.is_ready else _Answer(has_answered=False, problem=link.last_error)
+        if listener.is_ready:
+            return listener.look(clock())
+        ended = link.last_error and (ENDED.format(port) if "://" in port else link.last_error)
+        return _Answer(has_answered=False, problem=heard.stranger or ended)
     finally:
         if driver.state is LineState.READY:
             await Connection(link, driver, send, clock, config.body).shut_down()

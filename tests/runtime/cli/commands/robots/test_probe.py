@@ -153,6 +153,8 @@ class Peer(socketserver.BaseRequestHandler):
     """A device on the network that is no robot."""
 
     server: Server
+    ends = False
+    """Whether it ends the connection after its first answer."""
 
     def handle(self) -> None:
         exchanges = self.server.exchanges
@@ -162,6 +164,8 @@ class Peer(socketserver.BaseRequestHandler):
             exchange.answered += len(answer)
             exchange.taken += len(data)
             self.request.sendall(answer)
+            if self.ends:
+                return
 
     def answer(self, data: bytes) -> bytes:
         raise NotImplementedError
@@ -170,6 +174,15 @@ class Peer(socketserver.BaseRequestHandler):
 class Talker(Peer):
     def answer(self, _data: bytes) -> bytes:
         return b"220 print server ready\r\n"
+
+
+class WebServer(Talker):
+    ends = True
+
+
+class Full(WebServer):
+    def answer(self, _data: bytes) -> bytes:
+        return b""
 
 
 class Mirror(Peer):
@@ -196,6 +209,8 @@ class NamesItself(Peer):
     [
         (Talker, None, "a device sends text, as '220 print server ready'"),
         (Talker, "p3dx", "a device sends text, as '220 print server ready'"),
+        (WebServer, "p3dx", "a device sends text, as '220 print server ready'"),
+        (Full, "denning", "its other end ends the connection before a robot answers"),
         (Mirror, "denning", "what this program sends comes back"),
         (OnlySync0, "p3dx", "as p3dx: the robot answers SYNC0 and not SYNC1"),
         (OnlySync0, None, "as amigo: the robot answers SYNC0 and not SYNC1"),
