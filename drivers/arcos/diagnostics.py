@@ -32,6 +32,10 @@ _CONSTANT: Final = (
     "gripper", "front_sonar", "rear_sonar", "rev_count", "watchdog_ms", "front_bumpers", "rear_bumpers", "charger",
 )  # fmt: skip
 """What a robot's configuration holds that stands in its flash, or is how it is built."""
+NO_MODEL: Final = (
+    "the robot does not say of which model it is, likely it is a simulator: it is taken for that of the robot file; "
+    "compare a metre of its odometry with a real one"
+)
 NO_CONFIG: Final = (
     "the robot does not report its configuration, so its limits and watchdog are unknown; likely its firmware is "
     "old: the limits of the robot file apply, and a watchdog of 2 s is assumed"
@@ -102,10 +106,10 @@ def watchdog_note(deadman_s: float) -> str:
 
 def wrong_robot(name: RobotName, config: RobotConfig) -> str | None:
     """Return the message for a robot of another model than the robot file describes; None if it is one of those."""
-    subclass, known = name.subclass, config.arcos.subclasses
+    subclass, known = name.subclass and name.subclass.strip(), config.arcos.subclasses
     if not known or subclass is None or subclass.lower() in {one.lower() for one in known}:
         return None
-    shown, models = one_line(name.name or ""), ", ".join(known)
+    shown, models = one_line((name.name or "").strip()), ", ".join(known)
     if not subclass:
         return (
             f"the robot '{shown}' does not say of which model it is, and the robot file is for {models}: the factors "

@@ -334,6 +334,8 @@ class ArcosDriver(Session[PoseStamper]):
             return
         if packet is None:
             self._note_once(diagnostics.NO_CONFIG)
+        if name is not None and name.subclass is None and config.arcos.subclasses:
+            self._note_once(diagnostics.NO_MODEL)
         if handshake.keeps_baud:
             self._note_once(diagnostics.BAUD_KEPT.format(config.link.baud, handshake.baud))
         deadman_s = diagnostics.deadman_s(packet)

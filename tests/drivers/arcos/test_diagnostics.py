@@ -23,7 +23,7 @@ from tests.drivers.arcos.harness import P3DX_FILE
 from tests.drivers.arcos.vectors import P3DX
 
 
-@pytest.mark.parametrize("subclass", ["p3dx", "P3DX", "p2d8+", None])
+@pytest.mark.parametrize("subclass", ["p3dx", "P3DX", "p2d8+", "p3dx \r\n", None])
 def test_a_robot_of_the_files_models_or_without_a_name_is_accepted(subclass: str | None) -> None:
     assert wrong_robot(RobotName("a", "Pioneer", subclass), P3DX_FILE) is None
 
