@@ -119,6 +119,14 @@ def _address(url: str) -> tuple[str, int]:
     return parts.hostname, parts.port
 
 
+def explain_hang_up(url: str) -> str:
+    """Return the message for a connection that ended before a robot answered, in one line."""
+    return (
+        f"{url}: its other end ends the connection before a robot answers; likely it is another program's port, or "
+        "serves one client at a time: give the robot's port, or end the other client"
+    )
+
+
 def explain_tcp(url: str, error: BaseException) -> str:
     """Return the message for a connection that could not be made, in one line."""
     text = " ".join(str(error).split())

@@ -12,9 +12,11 @@ from config.errors import FAILED, UserError
 from config.robot import BodyConfig
 from drivers.base_model import stop_s
 from drivers.driver import LineState, RobotDriver
+from drivers.heard_bytes import HeardBytes
 from drivers.link import Link
 from drivers.messages import Flags
 from drivers.serial_port import LinkError, is_missing, open_port, opening_error
+from drivers.tcp_port import explain_hang_up, is_tcp
 from runtime.cycle.line_messages import ROBOT_LINE, LineMessages
 from runtime.cycle.step import STANDSTILL
 
@@ -61,7 +63,7 @@ class Connection(NamedTuple):
             run_s = self.clock()
             driver.tick(run_s)
             self.send()
-            lost = None if link.is_open else link.last_error
+            lost = self._why_lost()
             waited_max_s = ANSWER_TIMEOUT_S if driver.state is LineState.DOWN else CONNECT_MAX_S
             if run_s - begin_run_s > waited_max_s or lost is not None:
                 no_answer = f"no robot answers on {link.config.port}; check its power and link.baud"
@@ -70,6 +72,15 @@ class Connection(NamedTuple):
                 await link.stop()
                 raise UserError(reason or text, FAILED)
             await asyncio.sleep(POLL_S)
+
+    def _why_lost(self) -> str | None:
+        """Return why the line that was opened is closed; None while it is open."""
+        link, heard = self.link, getattr(self.driver, "heard", None)
+        if link.is_open or link.last_error is None:
+            return None
+        stranger = heard.stranger if isinstance(heard, HeardBytes) else None
+        is_network = link.config.port is not None and is_tcp(link.config.port)
+        return stranger or (explain_hang_up(str(link.config.port)) if is_network else link.last_error)
 
     def refuse_missing(self) -> None:
         """Raise what `connect` would raise if there is no such port; nothing is opened.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import itertools
 import random
 from collections.abc import Callable, MutableMapping
 from pathlib import Path
@@ -83,6 +85,45 @@ def test_a_port_that_sends_noise(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_line_that_is_lost_before_the_handshake(monkeypatch: pytest.MonkeyPatch) -> None:
     silent = Mute(kind="mute", at_s=0.0, duration_s=LONG_S)
     assert refusal(monkeypatch, silent, disturb=MemoryLink.pull) == "pulled out"
+
+
+@pytest.mark.parametrize(
+    ("sent", "said"),
+    [
+        (
+            b"HTTP/1.1 400 Bad Request\r\n\r\n",
+            "a device sends text, as 'HTTP/1.1 400 Bad Request'; it is not the robot",
+        ),
+        (b"", ": its other end ends the connection before a robot answers; likely it is another program's port"),
+    ],
+)
+async def test_another_programs_port_that_answers_and_hangs_up_is_no_cable(sent: bytes, said: str) -> None:
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.read(1)
+        writer.write(sent)
+        await writer.drain()
+        writer.close()
+
+    server = await asyncio.start_server(answer, "127.0.0.1", 0)
+    port = f"socket://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+    settings = load_settings("hallway", [f"link.port={port}"])
+    driver, now_s = (
+        make_driver(settings),
+        itertools.count(0.0, 0.001),
+    )  # counts the polls: a busy machine may take long
+
+    def send() -> None:
+        link.send(driver.outgoing(writable=link.writable))
+
+    link = Link(
+        settings.link, lambda: driver.line_opened(0.0), lambda data: driver.receive(data, next(now_s)),
+        lambda _reason: driver.line_closed(),
+    )  # fmt: skip
+    with pytest.raises(UserError) as refused:
+        await Connection(link, driver, send, lambda: next(now_s), settings.body).connect(lambda: False)
+    server.close()
+    assert said in str(refused.value)
+    assert refused.value.exit_code == FAILED
 
 
 async def test_a_port_that_is_missing_is_refused_as_its_opening_would_be(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from drivers.heard_bytes import HeardBytes
 from drivers.link import Link, LinkError
 from drivers.messages import Flags, Identity
 from drivers.registry import line_options, make_driver, other_robot
+from drivers.tcp_port import explain_hang_up, is_tcp
 from runtime.cycle.connection import POLL_S, Connection
 
 ANSWER_MAX_S: Final = 3.0
@@ -36,10 +37,6 @@ NOTHING: Final = "nothing answers: is the robot on, and is this its cable?"
 NO_FRAME: Final = (
     "no robot answers, and what is received is no frame of a known robot; another device is on this port, or one of "
     "another speed: name its file with --robot"
-)
-ENDED: Final = (
-    "{}: its other end ends the connection before a robot answers; likely it is another program's port, or serves "
-    "one client at a time: give the robot's port, or end the other client"
 )
 UNREADY: Final = (
     "it answers, but does not finish the handshake: restart the robot, and check its cable in both directions"
@@ -192,7 +189,7 @@ async def _try(port: str, config: RobotConfig, answer_max_s: float, *, again: bo
             await asyncio.sleep(POLL_S)
         if listener.is_ready:
             return listener.look(clock())
-        ended = link.last_error and (ENDED.format(port) if "://" in port else link.last_error)
+        ended = link.last_error and (explain_hang_up(port) if is_tcp(port) else link.last_error)
         return _Answer(has_answered=False, problem=heard.stranger or ended)
     finally:
         if driver.state is LineState.READY:
