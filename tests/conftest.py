@@ -5,7 +5,8 @@ Numba reads its settings on import, so the cache is configured here, before any 
 marked `realtime` are skipped there. Tests marked `soak` run only on request.
 
 `make tests` runs everything compiled, and the tests of kernels (marker `kernels`) as plain Python, because coverage
-(see tests/line_coverage.py) cannot see into compiled code; those marked `compiled` would be too slow there.
+(see tests/line_coverage.py) cannot see into compiled code; those marked `compiled` would be too slow there, and those
+marked `covered` execute no line that others do not.
 Tests that would compile kernels for themselves run as plain Python alone (see tests/inner_kernels.py).
 
 The result of a run must depend on the sources alone: hypothesis generates the same examples in every run (`make soak`
@@ -32,9 +33,8 @@ from tests import line_coverage
 
 COVERAGE = line_coverage.start()  # before any module of the product is imported
 
-from runtime.support import child_process  # noqa: E402
+from runtime.support import child_process, kernel_warmup  # noqa: E402
 from runtime.support.kernel_cache import use_kernel_cache  # noqa: E402
-from runtime.support.kernel_warmup import GARBAGE_MAX  # noqa: E402
 from tests import promise_page, promises  # noqa: E402
 from tests.compile_kernels import compile_all  # noqa: E402
 from tests.forked import ForkedTests  # noqa: E402
@@ -50,6 +50,7 @@ KERNEL_TESTS = [Path(__file__).parent / package for package in ("perception", "b
 """Folders with the tests of compiled kernels."""
 
 BROWSER_TESTS = Path(__file__).parent / "browser"
+WARM_UP_TESTS = ("test_kernel_warmup.py", "test_localization_warmup.py")
 
 for _name in TERMINAL:
     os.environ.pop(_name, None)
@@ -93,7 +94,7 @@ def pytest_collection() -> Generator[None, object, object]:
         return (yield)
     finally:
         gc.freeze()
-        gc.set_threshold(GARBAGE_MAX)
+        gc.set_threshold(kernel_warmup.GARBAGE_MAX)
         gc.enable()
 
 
@@ -179,6 +180,13 @@ def _children_at_usual_priority(request: pytest.FixtureRequest, monkeypatch: pyt
     """Start children at the priority of the tests: at the low one, a few tests at a time leave them no processor."""
     if request.path.name != "test_child_process.py":
         monkeypatch.setattr(child_process, "LOW_PRIORITY", "runpy")
+
+
+@pytest.fixture(autouse=True)
+def _kernels_stay_loaded(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Warm up no kernel again: a forked process has them all, and it took a third of the time of commands."""
+    if request.config.option.forks and request.path.name not in WARM_UP_TESTS:
+        monkeypatch.setattr(kernel_warmup, "warm_up", lambda _settings, parts: list(parts))
 
 
 @pytest.fixture(scope="session", autouse=True)
