@@ -198,6 +198,11 @@ def report_of(frame: Frame) -> Report:
             return frame
 
 
+_SEVEN_BITS: Final = 0x7F
+_SEVEN_BIT_FRAMES: Final = 50
+"""So many frames without an eighth bit are no chance: the checksum of each has one in two."""
+
+
 class Decoder:
     """Turns the bytes of one direction into frames.
 
@@ -210,6 +215,12 @@ class Decoder:
     def __init__(self) -> None:
         self.frames = self.bad = 0
         self._pending = b""
+        self._has_eighth_bit = False
+
+    @property
+    def lacks_eighth_bits(self) -> bool:
+        """Whether the line passes on seven bits of a byte: the checksum, an XOR, is right then, and no value is."""
+        return not self._has_eighth_bit and self.frames >= _SEVEN_BIT_FRAMES
 
     @property
     def pending(self) -> int:
@@ -218,6 +229,7 @@ class Decoder:
 
     def feed(self, data: bytes) -> list[Frame]:
         """Return what `data` completes, in order; how the bytes are split makes no difference."""
+        self._has_eighth_bit = self._has_eighth_bit or max(data, default=0) > _SEVEN_BITS
         data, at, found = self._pending + data, 0, list[Frame]()
         while (start := data.find(HEADER, at)) >= 0:
             end = start + 9 + data[start + 5] if start + 5 < len(data) else len(data) + 1

@@ -12,6 +12,11 @@ BRAKE_STAYS_ON: Final = (
     "release it and check its voltage, then arm again"
 )
 
+SEVEN_BITS: Final = (
+    "no byte of the robot has its eighth bit, so that its ranges and its odometry are wrong; a serial server or a "
+    "radio between passes on seven bits: set it to 8 data bits, no parity"
+)
+
 NO_SONAR: Final = (
     "no range comes from the sonars, and they are started again; another client may have stopped them, or their "
     "controller has no power: check it if this message returns"

@@ -304,6 +304,8 @@ class RflexDriver(Session[Measurements]):
             self._begin(LineState.DOWN, line_diagnostics.silence(silent_s, others=others, bad=bad, heard=self.heard))
         elif unanswered_s > 2.0 * link.silence_max_s:
             self._begin(LineState.DOWN, diagnostics.not_receiving(unanswered_s))
+        elif self._decoder.lacks_eighth_bits:
+            self._begin(LineState.DOWN, diagnostics.SEVEN_BITS)
         elif self._brake.mode is Mode.RELEASING and self._brake.tries > link.tries:
             self.halt()
             self._problem = diagnostics.BRAKE_STAYS_ON
@@ -364,8 +366,9 @@ class RflexDriver(Session[Measurements]):
         """Make the line READY, with the identity of the robot file; DOWN if its fail-safe is beyond the limits."""
         config = self._config
         wrong = line_diagnostics.deadman_refused(config.rflex.name, config.rflex.fail_safe_s, config.link)
-        if wrong is not None:
-            self._state, self._problem, self.is_other_robot = LineState.DOWN, wrong, True
+        if wrong is not None or self._decoder.lacks_eighth_bits:
+            self._state, self._problem = LineState.DOWN, wrong or diagnostics.SEVEN_BITS
+            self.is_other_robot = wrong is not None
             return
         radius_m = max(math.hypot(mount.x_m, mount.y_m) for mount in config.ring.mounts)
         name, count, deadman_s = config.rflex.name, len(config.ring.mounts), config.rflex.fail_safe_s

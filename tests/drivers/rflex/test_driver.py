@@ -123,6 +123,23 @@ def test_a_brake_that_stays_on_is_a_problem() -> None:
     assert cable.driver.problem == diagnostics.BRAKE_STAYS_ON
 
 
+def test_a_line_of_seven_bits_is_down_although_each_checksum_is_right() -> None:
+    cable = RFLEX.connected(world=PLAIN)
+    cable.unplug()
+    cable.split = lambda data: [bytes(byte & 0x7F for byte in data)]
+    cable.plug()
+    cable.run(2.0)
+    assert cable.driver.counts.bad == 0
+    assert cable.driver.state is LineState.DOWN
+    assert cable.driver.problem == diagnostics.SEVEN_BITS
+    cable.unplug()
+    cable.split = lambda data: [data]
+    cable.plug()
+    cable.until_state(LineState.READY, 2.0)
+    cable.run(1.0)
+    assert cable.driver.state is LineState.READY
+
+
 def test_a_lost_request_for_the_bumpers_is_made_good() -> None:
     cable = RFLEX.connected(*script(kind="bumper", at_s=4.0, duration_s=1.0))
     cable.robot.receive(encode(input_request(0)))
