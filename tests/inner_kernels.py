@@ -16,8 +16,8 @@ import pytest
 
 from perception.kernel_compiler import KernelDispatcher
 
-ELSEWHERE = ("compiled", "realtime", "boundscheck", "soak")
-"""Marks of tests that do not run as plain Python."""
+ELSEWHERE = ("compiled", "covered", "realtime", "boundscheck", "soak")
+"""Marks of tests that `make interpreted` leaves out, or that also run elsewhere."""
 OURS = "tests."
 
 

@@ -12,6 +12,7 @@ from perception.pipeline import Perception
 from tests.perception.edited import is_bayes
 
 
+@pytest.mark.covered
 def test_objects_hold_what_their_method_knows(seen: Perception) -> None:
     objects = seen.objects()
     assert len(objects) >= 4

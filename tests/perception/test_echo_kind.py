@@ -43,6 +43,7 @@ def heard(half_paths_m: Floats, noise_m: float = 1e-3, resolution_m: float = 0.0
     return found
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize("kind", ["plane", "corner", "edge"])
 @pytest.mark.parametrize(("bearing", "range_m"), [(0.1, 0.9), (-0.12, 3.0)])
 def test_exact_paths_give_place_and_kind(kind: str, bearing: float, range_m: float) -> None:
@@ -53,6 +54,7 @@ def test_exact_paths_give_place_and_kind(kind: str, bearing: float, range_m: flo
     assert found.misfit < 1e-3
 
 
+@pytest.mark.covered
 def test_a_cylinder_lies_between_edge_and_plane() -> None:
     found = heard(half_paths("cylinder", 0.05, 1.2, 0.3))
     assert found.kind == "cylinder"
@@ -71,6 +73,7 @@ def test_the_way_over_a_circle_is_the_shortest() -> None:
         np.testing.assert_allclose(half_paths_over_circle(t, l, complex(centre), radius_m), least, atol=1e-8)
 
 
+@pytest.mark.covered
 def test_places_are_as_far_off_as_the_deviations_say() -> None:
     rng, errors = np.random.default_rng(4), []
     for _ in range(8):
@@ -80,6 +83,7 @@ def test_places_are_as_far_off_as_the_deviations_say() -> None:
     assert 0.5 < np.std(errors) < 1.6
 
 
+@pytest.mark.covered
 def test_coarse_ranges_leave_the_kind_unknown_however_often_they_come() -> None:
     step = 0.03048
     for kind in KINDS:

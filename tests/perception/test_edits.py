@@ -35,6 +35,7 @@ from tests.perception.edited import (
 # Numbers.
 
 
+@pytest.mark.covered
 def test_objects_and_segments_keep_their_numbers(seen: Perception, firings: list[Firing]) -> None:
     before = {o.number: (o.x, o.y) for o in seen.objects()}
     assert len(before) >= 4
@@ -145,6 +146,7 @@ def test_a_placed_model_relaxes_onto_the_readings(seen: Perception, off_x: float
     assert found.number not in {None, rested.number}
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize("model", ["drum", "box"])
 def test_a_placed_model_is_reported_at_once_and_stays(seen: Perception, firings: list[Firing], model: str) -> None:
     """It is placed on the driven path, where many readings show free space."""
@@ -172,6 +174,7 @@ def test_a_placed_model_is_reported_at_once_and_stays(seen: Perception, firings:
     assert new.number not in {o.number for o in seen.objects()}
 
 
+@pytest.mark.covered
 def test_a_moved_object_keeps_its_number_and_relaxes_back(seen: Perception, firings: list[Firing]) -> None:
     rested = there(seen)
     number = number_of(rested)

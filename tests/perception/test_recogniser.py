@@ -19,6 +19,7 @@ TIMES = np.array([f.robot_s for f in FIRINGS])
 YAWS = np.array([f.ring_yaw for f in FIRINGS])
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize("method", ["paper", "bayes"])
 def test_arrays_give_what_the_pipeline_gives(method: str) -> None:
     config = PerceptionConfig(method=method)  # type: ignore[arg-type]
@@ -37,6 +38,7 @@ def test_arrays_give_what_the_pipeline_gives(method: str) -> None:
     assert recogniser.surroundings() == perception.labelled_objects()
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize(
     ("changed", "message"),
     [

@@ -13,6 +13,7 @@ DRIFT = "perception.localization.correct_drift=true"
 GRID = "perception.grid.method=elfes"
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize(("set_", "has_room"), [(PAPER, False), (PAPER, True), (DRIFT, False), (GRID, True)])
 def test_recognition_that_begins_later_has_the_parts_of_one_from_the_start(set_: str, has_room: bool) -> None:
     settings = load_settings("hallway", [PAPER, set_])

@@ -24,6 +24,7 @@ def looks(count: int, *, everything: bool) -> Looks:
     return Looks(sensor, bearing, distance, np.full(count, np.inf), read, np.full(count, 0.003))
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize("everything", [False, True])
 def test_directions_and_width_are_found(everything: bool) -> None:
     found = fit_beams(looks(1500, everything=everything), 3)
@@ -33,6 +34,7 @@ def test_directions_and_width_are_found(everything: bool) -> None:
     assert (np.degrees(found.sigmas) < 0.3).all()
 
 
+@pytest.mark.covered
 def test_a_sensor_that_heard_nothing_keeps_its_direction() -> None:
     found = fit_beams(looks(1500, everything=False), 4)
     assert found.turns[3] == 0.0

@@ -41,6 +41,7 @@ def test_a_slow_drive_finds_them_to_a_third_of_a_degree_and_three_millimetres(
     assert (found.max(axis=0) <= [0.3, 0.003, 0.002, 0.002, 0.002]).all()
 
 
+@pytest.mark.covered
 def test_without_a_surface_there_is_no_calibration() -> None:
     ring = calibration_drive(0, "cone", 0.0, 60.0).nominal
     silent = [Firing(0.1 * k, Pose(0.01 * k, 0.0, 0.0), 0.0, np.full(16, math.inf)) for k in range(50)]

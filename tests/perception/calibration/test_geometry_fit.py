@@ -31,6 +31,7 @@ def test_the_fit_returns_from_the_nominal_robot_to_the_true_one() -> None:
     assert fit.readings.sum() > 0.8 * len(firing)
 
 
+@pytest.mark.covered
 def test_without_a_measured_way_the_distance_is_as_uncertain_as_what_is_round_leaves_it() -> None:
     made = calibration_drive(5, "specular", 0.0, 12.0)
     drive = drive_of(made.firings, 0.101)

@@ -90,6 +90,7 @@ def test_where_more_directions_are_heard_than_kept_the_oldest_goes() -> None:
     assert sorted(ages.tolist()) == list(range(LOOKS_REMEMBERED))
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize("turn_rad", [1e-5, 1e-3, 0.02, 0.08])
 def test_looks_before_close_the_gaps_between_beams_that_just_touch(turn_rad: float) -> None:
     """Neighbours fire in turn while the ring turns; one reading in ten fails."""

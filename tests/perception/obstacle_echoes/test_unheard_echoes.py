@@ -36,6 +36,7 @@ def approach(to: Callable[[float, Floats], Floats], ring: FreshEchoes, mounts: F
         ring.update(Firing(0.1 * k, Pose(x, 0.0, 0.0), 0.0, to(x, heard(mounts, x, 0.0, BEAM))))
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_wall_that_is_too_near_to_be_heard_stays_where_it_was_heard(robot: str, seed: int) -> None:
@@ -197,6 +198,7 @@ def test_few_sensors_that_turn_away_from_what_they_heard_have_not_lost_it() -> N
         assert ring.unheard.is_ring_silent == is_lost
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("robot", "is_frozen"), [("hobby3", False), ("parking12", False), ("parking12", True)])
 def test_walls_beside_a_ring_go_on_while_it_hears_nothing_new(robot: str, is_frozen: bool, seed: int) -> None:

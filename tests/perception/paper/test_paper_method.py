@@ -90,6 +90,7 @@ def test_warm_starts_take_a_few_iterations() -> None:
     assert np.median(warm) < 0.7 * cold
 
 
+@pytest.mark.covered
 def test_the_size_of_quanta_does_not_change_results() -> None:
     """Refining two iterations at a time ends at the same pose as one long relaxation."""
     firings = list(drive(load_world("hallway"), (-6.0, 3.0)))
@@ -103,6 +104,7 @@ def test_the_size_of_quanta_does_not_change_results() -> None:
     np.testing.assert_array_equal(poses[0], poses[1])
 
 
+@pytest.mark.covered
 def test_refinement_takes_turns() -> None:
     """No candidate waits until another is at rest."""
     perception = perceive(settings(relaxation=RelaxationConfig(iterations_per_quantum=1)))

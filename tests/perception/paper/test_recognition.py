@@ -10,6 +10,7 @@ from tests import naive
 from tests.perception.random_outlines import EXACT, as_segments, random_segments, random_sides
 
 
+@pytest.mark.covered
 def test_goodness_of_fit_equals_its_oracle() -> None:
     rng = np.random.default_rng(9)
     supported = 0

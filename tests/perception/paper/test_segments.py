@@ -50,6 +50,7 @@ def test_no_tangent_outside_the_beams_nor_for_impossible_ranges() -> None:
     assert not tangent(0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 2.0, 1.5)[0]
 
 
+@pytest.mark.covered
 def test_pairing_equals_its_oracle_along_random_drives() -> None:
     rng = np.random.default_rng(2)
     made = 0

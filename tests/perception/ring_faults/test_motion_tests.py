@@ -73,6 +73,7 @@ def after(way_m: float) -> Ring:
     return ring
 
 
+@pytest.mark.covered
 def test_an_honest_ring_has_no_evidence_against_it() -> None:
     ring = after(2.0)
     assert ring.memory["repeated_nat"][0] == ring.missed_nat == 0.0
@@ -87,6 +88,7 @@ def test_equal_readings_on_the_way_are_repeats() -> None:
     assert set(found) == {NOTHING, REPEATED}
 
 
+@pytest.mark.covered
 def test_silence_and_the_maximum_are_the_same_and_randomness_is_something_else() -> None:
     rng = np.random.default_rng(1)
     for ranges, reason in (
@@ -97,6 +99,7 @@ def test_silence_and_the_maximum_are_the_same_and_randomness_is_something_else()
         assert after(0.5).fire(ranges) == reason
 
 
+@pytest.mark.covered
 def test_a_length_that_comes_to_all_ranges_is_named_in_that_round() -> None:
     for length in (0.4572, -0.4572, 1.2192):
         ring = after(0.5)
@@ -134,6 +137,7 @@ def mirrored(ring: Ring) -> Floats:
     return np.where(off < HALF, 2.0 + 0.5 * np.round(axes / (0.5 * math.pi)) % 2, math.inf)
 
 
+@pytest.mark.covered
 def test_mirrors_that_leave_all_beams_in_one_turn_are_one_event_and_not_many() -> None:
     """Four arrays of eight sensors, as on robots with arrays above each other, turn to and fro among mirrors."""
     ring = Ring(np.tile(MOUNTS[::3], (4, 1)))

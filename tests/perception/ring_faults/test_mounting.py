@@ -85,6 +85,7 @@ def test_an_echo_is_where_a_turned_ring_would_have_heard_it() -> None:
     assert len(places(ring)) == 0
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize("robot", ["p3dx", "amigo", "magellan"])
 def test_an_honest_robot_that_winds_between_rough_walls_is_never_doubted(robot: str) -> None:
     """Such walls lean to the path, and sensors one behind the other hear them in other distances."""
@@ -102,6 +103,7 @@ def test_an_honest_robot_that_winds_between_rough_walls_is_never_doubted(robot: 
     assert float(monitor._ring["excluded_nat"].min()) >= -EXCLUDED_NAT  # no more than the other way round
 
 
+@pytest.mark.covered
 def test_what_may_be_ahead_is_the_same_to_the_bit_after_a_restore() -> None:
     """With a part of the ring that turns: how it stands is not in a snapshot."""
     ring, rng = load_settings("room", robot="b21r-both").ring, np.random.default_rng(0)

@@ -46,6 +46,7 @@ def test_a_sensor_that_repeats_its_reading_through_a_full_turn_is_stuck() -> Non
     assert math.isnan(check.possible[2])
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize("room", [square_room, round_room])
 def test_no_honest_sensor_is_stuck_however_long_the_ring_turns(room: Callable[[float], float]) -> None:
     check = Checker()

@@ -31,6 +31,7 @@ def test_every_segment_in_the_map_is_listed_once_and_as_a_copy() -> None:
     assert 99 in mapped_segments(memory)["number"]
 
 
+@pytest.mark.covered
 def test_the_map_knows_how_many_segments_it_holds() -> None:
     memory, rng = new_memory(), np.random.default_rng(3)
     # Dense places fill their buckets; far ones take over the buckets of others.

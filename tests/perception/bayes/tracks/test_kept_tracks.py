@@ -88,6 +88,7 @@ def test_walls_come_back_whole(memory: Memory) -> None:
     assert (memory.state["room"] == room).all()
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize(("field", "value"), [("weight", np.nan), ("span_count", 99), ("number", 6)])
 def test_walls_with_a_number_out_of_its_bound_are_refused(memory: Memory, field: str, value: float) -> None:
     room = with_wall(memory).state["room"][0].copy()

@@ -95,6 +95,7 @@ def test_several_landmarks_that_fail_at_once_let_the_pose_be_doubted() -> None:
     assert tracker.is_doubtful
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize("degrees", [0.3, 3.0])
 def test_the_random_walk_of_the_heading_is_found_from_the_corrections(degrees: float) -> None:
     """The landmarks turn against the ring by the walk of each way, and are seen again to a fifth of a degree."""

@@ -46,6 +46,7 @@ def test_the_longest_segment_comes_first_and_then_the_nearest() -> None:
     assert order[0][0] <= -5
 
 
+@pytest.mark.covered
 def test_two_neighbours_on_mirrors_hold_the_tangent_of_their_arcs() -> None:
     """McKerrow's construction on exact ranges gives one of the lines that explain the run."""
     pairs = 0

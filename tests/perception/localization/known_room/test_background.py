@@ -41,6 +41,7 @@ def test_ranges_have_a_density_and_silence_the_rest(seed: int | None) -> None:
     assert background.log_ratio(some, shares) == pytest.approx(sum(alone))
 
 
+@pytest.mark.covered
 def test_the_share_that_hears_is_learned_and_forgotten() -> None:
     background = background_of(1)
     for _ in range(200):

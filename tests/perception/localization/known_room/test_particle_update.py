@@ -60,6 +60,7 @@ def test_an_update_is_the_formulas() -> None:
         assert (after[i]["late"], after[i]["wild"]) == pytest.approx((causes.late, causes.wild))
 
 
+@pytest.mark.covered
 def test_an_update_finds_the_place_and_the_heading_and_prefers_the_right_hypothesis() -> None:
     found = hypotheses_at((TRUTH.x + 0.1, TRUTH.y - 0.08, TRUTH.theta + 0.02), (TRUTH.x, TRUTH.y + 1.0, 2.0))
     around = make_surroundings(ROOM, MODEL, HALF_ANGLE)

@@ -52,6 +52,7 @@ def covariance_of(particle: Any) -> np.ndarray:
     return np.array([[xx, xy, x_s], [xy, yy, y_s], [x_s, y_s, ss]])
 
 
+@pytest.mark.covered
 def test_a_move_carries_place_and_scale_as_monte_carlo_does() -> None:
     found = hypotheses_at((1.0, 2.0, 0.5), half=0.0)
     rng = np.random.default_rng(0)

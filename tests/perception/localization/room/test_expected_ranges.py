@@ -28,6 +28,7 @@ def places(rooms: int = 6) -> list[tuple[WorldConfig, Pose]]:
     return [*(random_room(seed) for seed in range(rooms)), *clear]
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize("reflection", ["cone", "specular"])
 def test_ranges_equal_their_oracle(reflection: Reflection) -> None:
     silent = 0
@@ -46,6 +47,7 @@ def test_ranges_equal_their_oracle(reflection: Reflection) -> None:
     assert silent > 0
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize("reflection", ["cone", "specular"])
 def test_gradients_are_those_of_the_range(reflection: Reflection) -> None:
     step = 1e-6

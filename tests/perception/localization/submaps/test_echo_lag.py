@@ -99,6 +99,7 @@ def test_a_firing_is_entered_at_the_pose_from_which_it_was_heard(lag_s: float) -
     assert last.pose.theta == pytest.approx(1.9 - lag_s)
 
 
+@pytest.mark.covered
 def test_a_robot_that_stands_does_not_fill_the_window() -> None:
     lag = EchoLag(RING)
     for k in range(3000):

@@ -115,6 +115,7 @@ def test_residuals_slope_as_the_derivatives_say() -> None:
         np.testing.assert_allclose((later[1] - residuals[1]) / 1e-6, jacobians[1, :, column], atol=1e-5)
 
 
+@pytest.mark.covered
 def test_matches_show_the_scales_of_odometry() -> None:
     true = np.array([-0.03, 0.04])
     poses, links = chain(12, true)
@@ -129,6 +130,7 @@ def test_matches_show_the_scales_of_odometry() -> None:
     assert 0.0 < scales[1] < true[1]  # a few turns are little evidence beside the prior of 3 %
 
 
+@pytest.mark.covered
 def test_a_wrong_match_loses_its_weight() -> None:
     poses, links = chain()
     right = [match_link(k, k + 3, between(poses[k], poses[k + 3]), INFORMATION, is_next=False) for k in range(3)]

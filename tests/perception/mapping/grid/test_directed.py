@@ -89,6 +89,7 @@ def test_cells_that_may_be_sure_are_known_also_after_the_memory_was_overwritten(
     np.testing.assert_array_equal(grid.cells, other.cells)
 
 
+@pytest.mark.covered
 def test_order_of_the_sensors_in_a_firing_makes_no_difference() -> None:
     rng = np.random.default_rng(2)
     order = np.array([2, 0, 3, 1])
@@ -180,6 +181,7 @@ def test_probability_is_asked_from_any_direction_or_from_a_place() -> None:
     assert grid.probability(None)[100, 2] == 0.5
 
 
+@pytest.mark.covered
 def test_an_arc_never_needs_more_room_than_it_has() -> None:
     wide = Ring(MOUNTS[:1], math.radians(60.0), 0.0, 40.0)
     grid = DirectedGrid(Window(256, 0.05), wide)

@@ -66,6 +66,7 @@ def test_silence_shows_free_space_only_to_the_range_from_which_echoes_come() -> 
     assert grid.silence_m == 0.0
 
 
+@pytest.mark.covered
 def test_way_and_not_time_makes_a_repeat_count_again() -> None:
     standing, driving = make("directed"), make("directed")
     for k in range(10):

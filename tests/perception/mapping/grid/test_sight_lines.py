@@ -72,6 +72,7 @@ def test_a_passage_counts_up_to_the_first_cell_on_its_line_that_holds_something(
             assert found[row, column] == 0.0
 
 
+@pytest.mark.covered
 @settings(deadline=None, max_examples=12)
 @given(st.integers(0, 10_000))
 def test_nothing_behind_a_known_wall_is_ever_crossed(seed: int) -> None:
@@ -93,6 +94,7 @@ def test_nothing_behind_a_known_wall_is_ever_crossed(seed: int) -> None:
     assert not found[away >= radius + 1.5].any()
 
 
+@pytest.mark.covered
 @pytest.mark.parametrize(
     ("r", "bearing", "has_line", "has_count"),
     [(2.0, 0.0, True, True), (2.0, 0.9 * LOCATED_RAD, True, True), (2.0, 1.5 * LOCATED_RAD, False, True),
