@@ -85,9 +85,9 @@ def test_each_robot_drives_a_little_and_no_keyframe_is_refused(seed: int) -> Non
 @pytest.mark.parametrize(
     ("run", "robot", "seconds", "sets"),
     [
-        ("office", "denning", 12.0, ()),
-        ("room", "p3dx", 12.0, ("perception.grid.method=off",)),
-        ("room", "ears", 12.0, ("perception.grid.method=elfes",)),
+        ("office", "denning", 6.0, ()),
+        ("room", "p3dx", 6.0, ("perception.grid.method=off",)),
+        ("room", "ears", 6.0, ("perception.grid.method=elfes",)),
     ],
 )
 def test_no_keyframe_of_the_shipped_runs_is_refused(
@@ -95,7 +95,7 @@ def test_no_keyframe_of_the_shipped_runs_is_refused(
 ) -> None:
     mission = "round-the-room" if run == "room" else None
     settings = load_settings(run, sets, robot=robot, mission=mission)
-    check(adopt_all(settings, 0, seconds, 6.0), seconds, 6.0)
+    check(adopt_all(settings, 0, seconds, 3.0), seconds, 3.0)
 
 
 def test_a_refused_keyframe_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,7 +65,7 @@ def summed_up(results: list[TrialResult]) -> str:
 
 @promised
 def test_a_robot_with_a_wrong_clock_stops_by_name(measured: Callable[[str], None]) -> None:
-    results = measure(drawn(CLOCKS, 5, 1), lambda _: None)
+    results = measure(drawn(CLOCKS, 3, 1), lambda _: None)
     assert_found(results)
     assert max(one.named_s for one in results if one.named_s is not None) < 1.0
     measured(summed_up(results))
@@ -74,7 +74,7 @@ def test_a_robot_with_a_wrong_clock_stops_by_name(measured: Callable[[str], None
 @promised
 @pytest.mark.promise("P24")
 def test_a_ring_that_lies_is_named_and_nothing_is_touched(measured: Callable[[str], None]) -> None:
-    results = measure(drawn(RING, 6, 2), lambda _: None)
+    results = measure(drawn(RING, 4, 2), lambda _: None)
     assert_found(results)
     measured(summed_up(results))
 

@@ -100,7 +100,7 @@ def test_equal_readings_are_legitimate_if_nothing_should_change_them(
     acoustics: AcousticsConfig, measured: Callable[[str], None]
 ) -> None:
     """At rest before a wall, along one, between two, with slipping wheels, and at any angle."""
-    for angle in np.radians(np.arange(0.0, 90.0, 15.0)).tolist():
+    for angle in np.radians(np.arange(0.0, 90.0, 30.0)).tolist():
         c, s = math.cos(angle), math.sin(angle)
         walls = tuple(
             WallConfig(x1_m=-50 * c - d * s, y1_m=-50 * s + d * c, x2_m=50 * c - d * s, y2_m=50 * s + d * c)
@@ -117,7 +117,7 @@ def test_equal_readings_are_legitimate_if_nothing_should_change_them(
             for f, (x, y, _) in zip(firings(config, world, still), along, strict=False)
         )
         assert found(config, slipping) == {}, "the base slips, and no sensor is to blame"
-    measured("at rest, along walls at 6 angles and with slipping wheels: 0 masked")
+    measured("at rest, along walls at 3 angles and with slipping wheels: 0 masked")
 
 
 @promise

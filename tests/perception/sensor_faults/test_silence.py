@@ -122,7 +122,7 @@ RINGS: tuple[tuple[str, Callable[[int], RingConfig]], ...] = (
 
 @promise
 @pytest.mark.parametrize(
-    ("rooms", "stand_s"), [(range(0, 40, 5), 60.0), pytest.param(range(500, 600), 600.0, marks=pytest.mark.soak)]
+    ("rooms", "stand_s"), [(range(0, 40, 8), 60.0), pytest.param(range(500, 600), 600.0, marks=pytest.mark.soak)]
 )
 def test_no_healthy_sensor_is_named_in_any_room(
     rooms: range, stand_s: float, measured: Callable[[str], None]
@@ -136,14 +136,14 @@ def test_no_healthy_sensor_is_named_in_any_room(
 @promise
 def test_a_deaf_sensor_is_named_on_a_robot_that_turns(measured: Callable[[str], None]) -> None:
     rng, times = np.random.default_rng(11), list[float]()
-    drives = [(seed, *RINGS[seed % len(RINGS)]) for seed in range(10)]
+    drives = [(seed, *RINGS[seed % len(RINGS)]) for seed in range(6)]
     for seed, name, make in drives:
         ring = make(seed)
         deaf = int(rng.integers(len(ring.mounts)))
         found = named(Wandering(ring, seed, 240.0, deaf=deaf))
         assert set(found) <= {(deaf, "silent")}, (name, seed)
         times += found.values()
-    assert len(times) >= 8
+    assert len(times) >= 5
     measured(
         f"{len(drives)} wandering robots with a deaf sensor: {len(times)} named, "
         f"after {np.median(times):.0f} s (median)"

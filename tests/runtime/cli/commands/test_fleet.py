@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
+import pytest
 
 from config.errors import WRONG_CALL
+from runtime.cli.app import run_command
 
 
-def test_a_wrong_address_is_one_line() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "runtime.cli", "fleet", "http://host/"], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == WRONG_CALL
-    assert done.stderr.startswith("echolocate: http://host/: give the start URL")
-    assert len(done.stderr.splitlines()) == 1
+def test_a_wrong_address_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["fleet", "http://host/"]) == WRONG_CALL
+    error = capsys.readouterr().err
+    assert error.startswith("echolocate: http://host/: give the start URL")
+    assert len(error.splitlines()) == 1
