@@ -218,8 +218,11 @@ def _checked(firings: Iterable[Firing], path: Path) -> Iterator[Firing]:
     """
     for firing in firings:
         if (firing.ranges_m < 0.0).any():
+            is_nan = np.isneginf(firing.ranges_m).any()
+            what, word = ("nan", "nan") if is_nan else ("below 0", "that number")
             raise RingLogError(
-                f"{path}: at t = {firing.robot_s!r}, a range is below 0 or nan; correct or delete the row"
+                f"{path}: at t = {firing.robot_s!r}, a range is {what}; correct or delete the row, or say "
+                f"--not-fired {word} if the sensor did not fire then, or --silence {word} if it heard nothing"
             )
         yield firing
 

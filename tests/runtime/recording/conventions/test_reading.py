@@ -20,7 +20,7 @@ from config.robot import SensorConfig
 from drivers.firing_pattern import firing_pattern
 from drivers.messages import Firing, Floats, Pose
 from runtime.recording.conventions.options import AUTO, RingLogOptions
-from runtime.recording.conventions.reading import FIRST_OF_PIPE, converted_firings, open_ring_log
+from runtime.recording.conventions.reading import FIRST_OF_PIPE, _checked, converted_firings, open_ring_log
 from runtime.recording.ring_log import RingLogError, read_ring_log
 from runtime.recording.ring_log_replay import replay_firings
 from tests.recordings import DATA, recording
@@ -395,3 +395,11 @@ def test_a_robot_that_stands_has_not_moved_by_what_interpolation_rounds() -> Non
         for t, place, ranges in zip(drive.t, pose.tolist(), drive.ranges, strict=True)
     ]
     assert list(converted_firings(rows, Path("log.csv"), drive.settings, AUTO, pytest.fail)) == rows
+
+
+@pytest.mark.parametrize(("value", "word"), [(-math.inf, "--not-fired nan"), (-3.0, "--not-fired that number")])
+def test_a_range_that_is_still_none_is_refused_with_the_options_that_settle_it(value: float, word: str) -> None:
+    """Of a table that mixes nan and empty cells, the data may not show what nan stands for."""
+    firing = Firing(2.5, Pose(0.0, 0.0, 0.0), 0.0, np.array([1.0, value, math.nan]))
+    with pytest.raises(RingLogError, match=f"at t = 2.5, a range is .* say {word}"):
+        list(_checked([firing], Path("log")))
