@@ -23,7 +23,10 @@ from drivers.tcp_port import explain_hang_up, is_tcp
 from runtime.cycle.connection import POLL_S, Connection
 
 ANSWER_MAX_S: Final = 3.0
-"""Longest wait for a robot's first frame, s: as long as it takes to call a Pioneer at every speed of its line."""
+"""Longest wait for a robot's first frame, s: to call a Pioneer at every speed of its line takes as long, and so does
+the start of a board that opening its port restarts."""
+LEAST_S: Final = 0.7
+"""Least wait, s, although a driver has given up: this program may be held up, and all families take 5 s at most."""
 SOCKET_MAX_S: Final = 3.9
 """Longest wait for first frames over a network, of all families, s: nothing is lost there, and it has no speeds. A
 third is the time to listen to a Pioneer's line and to wait for the answer to its first SYNC."""
@@ -101,31 +104,33 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
         Robots by the names by which they are run.
     """
     said, best = dict[str, list[str]](), (0, Finding(None, ()))  # what was said as which robots
-    strangers, tries = list[str](), itertools.count()
-    is_socket = "://" in port
+    strangers, line, is_socket = list[str](), _Line(port), "://" in port
     key = partial(_family, is_socket=is_socket)
     families = [list(ones) for _, ones in itertools.groupby(sorted(robots.items(), key=key), key=key)]
     answer_max_s = min(ANSWER_MAX_S, SOCKET_MAX_S / len(families)) if is_socket else ANSWER_MAX_S
-    for family in families:
-        events = tuple[_Event, ...]()
-        for name, config in family:
-            answer = _heard_as(config, events) or await _try(port, config, answer_max_s, again=next(tries) > 0)
-            events = answer.events
-            if answer.text is not None:
-                if best[1].robot is None or answer.fired > best[0]:
-                    best = (answer.fired, Finding(name, (answer.text,)))
-                if answer.is_whole:
-                    return best[1]
-            if answer.stranger is not None:
-                strangers.append(answer.stranger)
-            if answer.problem is not None:
-                said.setdefault(answer.problem, []).extend([name] if answer.has_answered else ())
-            if not answer.has_answered or (answer.problem is not None and not answer.is_other):
-                break
-        if best[1].robot is not None:
-            return best[1]
-        if answer.has_answered or answer.problem is not None:
-            break  # it is of this family, or the port cannot be opened
+    try:
+        for family in families:
+            events = tuple[_Event, ...]()
+            for name, config in family:
+                answer = _heard_as(config, events) or await _try(line, config, answer_max_s)
+                events = answer.events
+                if answer.text is not None:
+                    if best[1].robot is None or answer.fired > best[0]:
+                        best = (answer.fired, Finding(name, (answer.text,)))
+                    if answer.is_whole:
+                        return best[1]
+                if answer.stranger is not None:
+                    strangers.append(answer.stranger)
+                if answer.problem is not None:
+                    said.setdefault(answer.problem, []).extend([name] if answer.has_answered else ())
+                if not answer.has_answered or (answer.problem is not None and not answer.is_other):
+                    break
+            if best[1].robot is not None:
+                return best[1]
+            if answer.has_answered or answer.problem is not None:
+                break  # it is of this family, or the port cannot be opened
+    finally:
+        await line.close()
     return Finding(None, _lines(said, strangers))
 
 
@@ -145,56 +150,117 @@ def _family(item: tuple[str, RobotConfig], *, is_socket: bool) -> tuple[str, int
     return item[1].robot.driver, 0 if is_socket else item[1].link.baud
 
 
-async def _try(port: str, config: RobotConfig, answer_max_s: float, *, again: bool = False) -> _Answer:
+async def _try(line: _Line, config: RobotConfig, answer_max_s: float) -> _Answer:
     """Return what the driver of one robot finds out; it is never released, so nothing moves.
 
     Parameters
     ----------
-    port, config
-        The port, and the robot.
+    line
+        The port.
+    config
+        The robot.
     answer_max_s
         Longest wait for its first frame, s.
-    again
-        Whether the port was open just before.
     """
-    config = config.model_copy(update={"link": config.link.model_copy(update={"port": port})})
-    listener, clock, heard = _Listener(config, answer_max_s), time.monotonic, HeardBytes()
-    driver, heard.find_robot = listener.driver, partial(other_robot, config.robot.driver)
-
-    def send() -> None:
-        link.set_baud(driver.line_baud)
-        if link.is_open and (data := listener.sent(clock(), writable=link.writable)):
-            heard.sent(data)
-            link.send(data)
-
-    def opened() -> None:
-        listener.opened(clock())
-        send()
-
-    def received(data: bytes) -> None:
-        heard.received(data)
-        listener.received(data, clock())
-
-    link = Link(config.link, opened, received, lambda _reason: driver.line_closed(), **line_options(config))
+    config = config.model_copy(update={"link": config.link.model_copy(update={"port": line.port})})
+    listener, clock = _Listener(config, answer_max_s), time.monotonic
+    driver = listener.driver
     try:
-        await _open(link, AGAIN_MAX_S if again else 0.0, clock)
+        link, heard = await line.open(config, listener)
     except LinkError as error:
         return _Answer(has_answered=False, problem=str(error))
+    answer = _Answer(has_answered=True)
     try:
         while link.is_open:
-            send()
-            if (answer := listener.found(clock())) is not None:
+            line.send()
+            if (found := listener.found(clock(), clock() - line.opened_s)) is not None:
+                answer = found._replace(events=tuple(listener.events))
                 stranger = None if answer.has_answered or not heard.total else heard.stranger or NO_FRAME
-                return answer._replace(stranger=stranger, events=tuple(listener.events))
+                return answer._replace(stranger=stranger)
             await asyncio.sleep(POLL_S)
         if listener.is_ready:
             return listener.look(clock())
-        ended = link.last_error and (explain_hang_up(port) if is_tcp(port) else link.last_error)
+        ended = link.last_error and (explain_hang_up(line.port) if is_tcp(line.port) else link.last_error)
         return _Answer(has_answered=False, problem=heard.stranger or ended)
     finally:
         if driver.state is LineState.READY:
-            await Connection(link, driver, send, clock, config.body).shut_down()
-        await link.stop()
+            await Connection(link, driver, line.send, clock, config.body).shut_down()
+        if answer.has_answered or "://" in line.port:
+            await line.close()
+
+
+class _Line:
+    """A port, which stays open until something answers, so that a board that it restarts does so once.
+
+    A network line is closed after each family: what is sent to one may be taken for the begin of another's session.
+
+    Attributes
+    ----------
+    port
+        The port.
+    opened_s
+        When it was opened, s.
+    """
+
+    def __init__(self, port: str) -> None:
+        self.port, self.opened_s = port, 0.0
+        self._link: Link | None = None
+        self._listener: _Listener | None = None
+        self._heard: HeardBytes | None = None
+        self._is_again = False
+        """Whether the port was open just before."""
+        self._baud: int | None = None
+
+    async def open(self, config: RobotConfig, listener: _Listener) -> tuple[Link, HeardBytes]:
+        """Return the open line, on which a listener begins, and the bytes that it hears.
+
+        Raises
+        ------
+        LinkError
+            It cannot be opened.
+        """
+        self._heard, self._listener, self._baud = (heard := HeardBytes()), listener, config.link.baud
+        heard.find_robot = partial(other_robot, config.robot.driver)
+        if self._link is not None and self._link.is_open:
+            self._begin()
+            return self._link, heard
+        self._link = Link(config.link, self._opened, self._received, self._lost, **line_options(config))
+        tries_s, self._is_again = AGAIN_MAX_S if self._is_again else 0.0, True
+        await _open(self._link, tries_s, time.monotonic)
+        return self._link, heard
+
+    def send(self) -> None:
+        """Send what the listener's driver has to send."""
+        link, listener, heard = self._link, self._listener, self._heard
+        if link is None or listener is None or heard is None:
+            return
+        link.set_baud(listener.driver.line_baud or self._baud)
+        if link.is_open and (data := listener.sent(time.monotonic(), writable=link.writable)):
+            heard.sent(data)
+            link.send(data)
+
+    async def close(self) -> None:
+        """Close it."""
+        if self._link is not None:
+            await self._link.stop()
+
+    def _opened(self) -> None:
+        self.opened_s = time.monotonic()
+        self._begin()
+
+    def _begin(self) -> None:
+        if self._listener is not None:
+            self._listener.opened(time.monotonic())
+            self.send()
+
+    def _received(self, data: bytes) -> None:
+        if self._listener is not None and self._heard is not None:
+            self._heard.received(data)
+            self._listener.received(data, time.monotonic())
+
+    def _lost(self, _reason: str) -> None:
+        if self._listener is not None:
+            self._listener.driver.line_closed()
 
 
 def _heard_as(config: RobotConfig, events: tuple[_Event, ...]) -> _Answer | None:
@@ -258,8 +324,11 @@ class _Listener:
         self.driver.tick(at_s)
         return self.driver.outgoing(writable=writable)
 
-    def found(self, at_s: float) -> _Answer | None:
-        """Return what was found out; None as long as more may come."""
+    def found(self, at_s: float, open_s: float = 0.0) -> _Answer | None:
+        """Return what was found out; None as long as more may come.
+
+        A driver that gives up is believed if the line has been open for so long (s) that a robot has started.
+        """
         driver = self.driver
         has_answered, waited_s = driver.counts.frames > 0, at_s - self._begin_s
         if driver.state is LineState.READY:
@@ -269,7 +338,8 @@ class _Listener:
             return answer if answer.is_whole or at_s - self._ready_s >= LOOK_S else None
         if has_answered and (driver.state is LineState.DOWN or waited_s > READY_MAX_S):
             return _Answer(has_answered=True, problem=driver.problem or UNREADY, is_other=_is_other(driver))
-        if not has_answered and waited_s > self._answer_max_s:
+        has_given_up = driver.state is LineState.DOWN and waited_s > LEAST_S and open_s > ANSWER_MAX_S
+        if not has_answered and (has_given_up or waited_s > self._answer_max_s):
             return _Answer(has_answered=False)
         return None
 

@@ -36,8 +36,7 @@ async def test_of_robots_that_do_not_name_themselves_the_one_of_which_all_or_mos
     robots = {name: load_robot(name) for name in ("atrvjr", "b21r", "b21r-both", "denning", "magellan")}
     asked = list[str]()
 
-    async def answer(_port: str, config: RobotConfig, _answer_max_s: float, *, again: bool) -> port_probe._Answer:
-        assert again == bool(asked)
+    async def answer(_line: port_probe._Line, config: RobotConfig, _answer_max_s: float) -> port_probe._Answer:
         (name,) = (name for name, known in robots.items() if known is config)
         asked.append(name)
         if config.robot.driver != "rflex":
@@ -67,8 +66,7 @@ async def test_what_answers_one_family_is_asked_again_only_if_it_says_what_it_is
     robots = {name: load_robot(name) for name in ("amigo", "b21r", "denning", "hobby8", "p3at", "p3dx")}
     tried, waits_s = list[str](), set[float]()
 
-    async def answer(_port: str, config: RobotConfig, answer_max_s: float, *, again: bool) -> port_probe._Answer:
-        assert again == bool(tried)
+    async def answer(_line: port_probe._Line, config: RobotConfig, answer_max_s: float) -> port_probe._Answer:
         (name,) = (name for name, known in robots.items() if known is config)
         tried.append(name)
         waits_s.add(answer_max_s)
@@ -122,7 +120,7 @@ async def test_what_has_answered_and_is_not_ready_is_said_also_behind_a_calibrat
     monkeypatch.setattr(port_probe, "READY_MAX_S", 0.0)
     monkeypatch.setattr(Link, "open_once", open_once)
     monkeypatch.setattr(Link, "is_open", True)
-    found = await port_probe._try("socket://localhost:1", load_robot("p3dx"), 0.0)
+    found = await port_probe._try(port_probe._Line("socket://localhost:1"), load_robot("p3dx"), 0.0)
     assert found._replace(events=()) == port_probe._Answer(has_answered=True, problem=answer[0], is_other=answer[1])
 
 
@@ -133,7 +131,7 @@ async def test_a_socket_has_no_speeds_so_that_its_families_are_those_of_the_driv
     fast = robot.model_copy(update={"link": robot.link.model_copy(update={"baud": 115200})})
     asked = list[float]()
 
-    async def answer(_port: str, _config: RobotConfig, answer_max_s: float, **_: bool) -> port_probe._Answer:
+    async def answer(_line: port_probe._Line, _config: RobotConfig, answer_max_s: float) -> port_probe._Answer:
         asked.append(answer_max_s)
         return port_probe._Answer(has_answered=False)
 
@@ -204,19 +202,31 @@ class Line:
 
 
 @pytest.mark.parametrize("robot", list_shipped("robots"))
-async def test_a_robot_on_the_network_is_found_within_four_seconds_and_its_family_called_twice_at_most(
+async def test_a_robot_is_found_within_five_seconds_and_its_family_called_twice_at_most(
     robot: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The time is that of the waits, counted: a busy machine adds its own."""
-    line = Line(robot)
+    robots = {name: load_robot(name) for name in list_shipped("robots")}
+    for port, longest_s in (("socket://localhost:1", 4.0), ("/dev/ttyUSB0", 5.0)):
+        line = Line(robot)
+        monkeypatch.setattr(port_probe, "Link", line)
+        monkeypatch.setattr(port_probe, "time", SimpleNamespace(monotonic=lambda of=line: of.now_s))
+        monkeypatch.setattr(asyncio, "sleep", line.sleep)
+        found = await port_probe.probe_port(port, robots)
+        assert found.robot == {"ears": "denning", "b21r-both": "b21r"}.get(robot, robot), "the first that fires whole"
+        assert line.now_s <= longest_s
+        driver = robots[robot].robot.driver
+        assert line.opened <= {"arcos": 2, "denning": 3, "rflex": 3}[driver], f"one of each family before {driver}"
+
+
+async def test_a_serial_port_on_which_nothing_answers_is_opened_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Opening it restarts some boards, which do not answer until they have started."""
+    line = Line("hobby8")
+    line.device = SimpleNamespace(advance=lambda _to_s: b"", receive=lambda _data: None)
     monkeypatch.setattr(port_probe, "Link", line)
     monkeypatch.setattr(port_probe, "time", SimpleNamespace(monotonic=lambda: line.now_s))
     monkeypatch.setattr(asyncio, "sleep", line.sleep)
     robots = {name: load_robot(name) for name in list_shipped("robots")}
-    found = await port_probe.probe_port("socket://localhost:1", robots)
-    assert found.robot == {"ears": "denning", "b21r-both": "b21r"}.get(robot, robot), (
-        "the first whose sensors all fire"
-    )
-    assert line.now_s <= 4.0
-    driver = robots[robot].robot.driver
-    assert line.opened <= {"arcos": 2, "denning": 3, "rflex": 3}[driver], f"one of each family before {driver}"
+    assert await port_probe.probe_port("/dev/ttyUSB0", robots) == port_probe.Finding(None, (port_probe.NOTHING,))
+    assert (line.opened, line.is_open) == (1, False)
+    assert line.now_s <= 5.0
