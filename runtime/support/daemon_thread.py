@@ -7,7 +7,6 @@ at all, and the next start goes on from there.
 
 from __future__ import annotations
 
-import asyncio
 import atexit
 import contextlib
 import contextvars
@@ -16,7 +15,10 @@ import sys
 import threading
 from collections.abc import Callable
 from functools import partial
-from typing import Final, NoReturn, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Final, NoReturn, ParamSpec, TypeVar
+
+if TYPE_CHECKING:
+    import asyncio
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -27,6 +29,8 @@ NAME: Final = "left at the end"
 
 async def in_daemon_thread(call: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
     """Call a function in a thread that no end waits for, and return what it returns."""
+    import asyncio  # takes long, and `exit_process` ends every command
+
     loop, context = asyncio.get_running_loop(), contextvars.copy_context()
     future: asyncio.Future[R] = loop.create_future()
 
