@@ -110,8 +110,8 @@ def test_the_oldest_makes_room() -> None:
 def test_a_snapshot_keeps_it_and_a_reset_forgets_it() -> None:
     drive, other = heard_behind(), FreshEchoes(MOUNTS, BEAM, (), REACH_M)
     put_back(other, snapshot_of(drive.ring))
-    kept = [ring.unheard.remembered.ahead(AHEAD, 2.0, 0.3, BEAM) for ring in (drive.ring, other)]
-    assert len(kept[0]) == 1
-    np.testing.assert_array_equal(*kept)
+    kept = drive.ring.unheard.remembered.ahead(AHEAD, 2.0, 0.3, BEAM)
+    assert len(kept) == 1
+    np.testing.assert_array_equal(other.unheard.remembered.ahead(AHEAD, 2.0, 0.3, BEAM), kept)
     drive.ring.clear()
     assert drive.ahead() == []
