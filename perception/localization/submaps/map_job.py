@@ -16,6 +16,7 @@ from perception.localization.submaps.local_grid import (
     answers_of,
     make_grid,
 )
+from perception.localization.submaps.map_lines import find_lines, moved_lines, with_lines
 from perception.localization.submaps.map_match import Match, best_match
 from perception.localization.submaps.pose_graph import (
     GRAPH_SCALE_SIGMAS,
@@ -27,7 +28,7 @@ from perception.localization.submaps.pose_graph import (
     go_on,
     linearise,
 )
-from perception.localization.submaps.submap_records import between, match_link, pose_of, spread_about
+from perception.localization.submaps.submap_records import between, match_link, pose_of, spread_about, unlost
 from perception.records import Structured, records, zeros
 
 OVERLAP_M: Final = 6.0
@@ -75,6 +76,8 @@ class Maps(NamedTuple):
     """Sum of the log likelihoods of known readings where maps fitted, and their number, shape (2,)."""
     grids: dict[int, Floats]
     """Hits and passes of maps by number, shape (2, SUBMAP_CELLS, SUBMAP_CELLS) each, the last used at the end."""
+    lines: dict[int, Floats]
+    """Lines of maps by number, as of `map_lines.find_lines`. Updated."""
 
 
 class Outcome(NamedTuple):
@@ -86,6 +89,8 @@ class Outcome(NamedTuple):
     usual: Floats
     gain: float
     """Log likelihood of the matches with drift less that without."""
+    determined: float
+    """How many numbers of the maps' poses follow from matches, and not from odometry."""
 
 
 def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
@@ -95,6 +100,9 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
     readings = np.ascontiguousarray(maps.submaps[number]["readings"][:count])
     for grid in make_grid(readings, half_angle):
         maps.grids[number] = grid
+        yield None
+    for lines in find_lines(readings, half_angle):
+        maps.lines[number] = lines
         yield None
     nodes, links, usual = maps.nodes, maps.links, maps.usual.copy()
     spread = spread_about(number, links, nodes)
@@ -131,16 +139,24 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
         if number - 1 in run:
             usual += log_likelihood, match.known
         covariance = np.linalg.inv(match.information) + np.diag([MATCH_M**2, MATCH_M**2, MATCH_RAD**2])
-        off = match.pose - expected
+        is_next, information = number - 1 in run, np.linalg.inv(covariance)
+        pose, by_lost = unlost(match.pose, is_next=is_next)
+        if is_next:  # loops find walls from both sides, and as they were bent by the drift between
+            before = np.concatenate([_lines_of(maps, member, nearest, half_angle) for member in run])
+            of_cells = information
+            pose, information = with_lines(before, maps.lines[number], pose, of_cells)
+            covariance = np.linalg.inv(information)
+            by_lost = covariance @ of_cells @ by_lost
+            yield None
+        off = pose - expected
         off[2] = wrap_angle(off[2])
         chi = off @ np.linalg.inv(covariance + np.diag([place, place, turn])) @ off
         misfit = usual[0] / usual[1] - log_likelihood / max(match.known, 1.0)
         if match.known >= KNOWN_MIN and misfit <= MISFIT_MAX and chi <= MATCH_GATE:
-            found.append(
-                match_link(nearest, number, match.pose, np.linalg.inv(covariance), is_next=number - 1 in run)
-            )
+            found.append(match_link(nearest, number, pose, by_lost, information, is_next=is_next))
     links = np.concatenate([links, *found])
-    yield from _solve(Maps(maps.submaps, nodes, links, maps.scales, usual, maps.grids), is_new=len(found) > 0)
+    solved = maps._replace(nodes=nodes, links=links, usual=usual)
+    yield from _solve(solved, is_new=len(found) > 0)
 
 
 def _grid_of(maps: Maps, number: int, half_angle: float) -> Floats:
@@ -151,6 +167,16 @@ def _grid_of(maps: Maps, number: int, half_angle: float) -> Floats:
         *_, grid = make_grid(np.ascontiguousarray(submap["readings"][: submap["count"]]), half_angle)
     maps.grids[number] = grid
     return grid
+
+
+def _lines_of(maps: Maps, number: int, nearest: int, half_angle: float) -> Floats:
+    """Return the lines of a map before in the frame of another one; found again at once if they are not kept."""
+    lines = maps.lines.get(number)
+    if lines is None:
+        submap = maps.submaps[number]
+        *_, lines = find_lines(np.ascontiguousarray(submap["readings"][: submap["count"]]), half_angle)
+        maps.lines[number] = lines
+    return moved_lines(lines, between(pose_of(maps.nodes[nearest]), pose_of(maps.nodes[number])))
 
 
 def _runs(numbers: Sequence[int]) -> list[list[int]]:
@@ -197,7 +223,17 @@ def _solve(maps: Maps, *, is_new: bool) -> Iterator[Outcome | None]:
     of_odometry = maps.links["is_match"] == 0
     off = residuals[of_odometry]
     cost += 0.5 * float(np.einsum("ij,ijk,ik->", off, maps.links["information"][of_odometry], off))
-    yield Outcome(maps.nodes, maps.links, scales, maps.usual, at_odometry - cost)
+    yield Outcome(maps.nodes, maps.links, scales, maps.usual, at_odometry - cost, _determined(maps.links))
+
+
+def _determined(links: Structured) -> float:
+    """Return how many numbers of the maps' poses follow from matches with earlier maps, and not from odometry."""
+    is_match = links["is_match"] != 0
+    by_odometry, matches = links[~is_match], links[is_match]
+    known = np.zeros((1 + int(links["to"].max(initial=0)), 3, 3))
+    np.add.at(known, matches["to"], matches["weight"][:, None, None] * matches["information"])
+    known = known[by_odometry["to"]]
+    return float(np.trace(known @ np.linalg.inv(known + by_odometry["information"]), axis1=1, axis2=2).sum())
 
 
 def _cost_at_odometry(maps: Maps, jacobians: Floats, residuals: Floats) -> float:

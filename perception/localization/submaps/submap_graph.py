@@ -22,7 +22,7 @@ from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, POSITIVE, bounds, 
 from perception.kernel import Floats
 from perception.localization.localized_pose import KnownWay, LocalizedPose, Moment, Status
 from perception.localization.submaps.held_maps import HeldMaps
-from perception.localization.submaps.map_job import Maps, Outcome, match_map
+from perception.localization.submaps.map_job import RUN_MAX, Maps, Outcome, match_map
 from perception.localization.submaps.pose_graph import OF_OTHER, SCALES, Link, Node
 from perception.localization.submaps.submap_records import (
     PATH_PLACES,
@@ -62,11 +62,10 @@ USUAL_LOG: Final = -0.7
 USUAL_READINGS: Final = 100.0
 """How many readings that is worth."""
 REFUTED: Final = 3.0
-"""Log likelihood by which matches refute odometry, nat, beyond `REFUTED_A_MAP` for each map."""
-REFUTED_A_MAP: Final = 0.55
-"""What is fitted to noise gains ½ nat for each number that it determines, about one a map. Drives with exact poses (4
-real ones in 4 roundings, 12 in buildings) gain 0.10 to 0.50 a map, and stay 2.6 nat below or more. Drives with drift
-among mirrors are refuted after 19 % of the way, with 0.6 after 24 %."""
+"""Log likelihood by which matches refute odometry, nat, beyond `REFUTED_A_NUMBER` for each number they determine."""
+REFUTED_A_NUMBER: Final = 0.55
+"""What is fitted to noise gains ½ nat for each number that it determines, one a map at least. Of drives with exact
+poses (4 real ones, 6 in buildings) no gain comes within 0.6 nat of that."""
 
 GRIDS_MAX: Final = 250
 """Maps whose grids are kept, 79 MB in all: at most 750 m of way. An older one is made again where it is needed."""
@@ -86,7 +85,7 @@ class SubmapGraph:
         Whether matches have refuted odometry, so that poses are corrected.
     """
 
-    SCRATCH: Final = ("_grids", "_job", "_ended_way", "_way")
+    SCRATCH: Final = ("_grids", "_lines", "_job", "_ended_way", "_way")
     BOUNDS: Final = bounds(
         _mounts=CONSTANT,
         _half_angle=CONSTANT,
@@ -122,6 +121,7 @@ class SubmapGraph:
         """Start again: the next firing's odometry defines the map frame."""
         self._submaps, self._nodes, self._links = Rows(Submap), Rows(Node), Rows(Link)
         self._grids: dict[int, Floats] = {}
+        self._lines: dict[int, Floats] = {}
         self._job: Iterator[Outcome | None] | None = None
         self._ended_way: tuple[tuple[int, ...], KnownWay] | None = None
         self._way: tuple[tuple[int, ...], KnownWay] | None = None
@@ -229,6 +229,7 @@ class SubmapGraph:
             self._scales.copy(),
             self._usual.copy(),
             self._grids,
+            self._lines,
         )
         return match_map(maps, self._half_angle)
 
@@ -243,11 +244,13 @@ class SubmapGraph:
             poses = self._submaps.archived_rows["pose"]
             moved = scaled(between(poses[k - 1], poses[k]), self._scales)
             nodes[k : k + 1] = node_at(compose(pose_of(nodes[k - 1]), moved))
-        self.is_applied = self.is_applied or outcome.gain > REFUTED + REFUTED_A_MAP * self._matched
+        numbers = max(outcome.determined, self._matched)
+        self.is_applied = self.is_applied or outcome.gain > REFUTED + REFUTED_A_NUMBER * numbers
         self._matched += 1
         self._quanta, self._job = 0, None
         for number in list(self._grids)[:-GRIDS_MAX]:
             del self._grids[number]
+        self._lines.pop(self._matched - RUN_MAX, None)
         self._spread[:] = spread_about(0, self._links.archived_rows, self._nodes.archived_rows)[-1]
 
     @property
@@ -276,7 +279,7 @@ class SubmapGraph:
 
     def drop_caches(self) -> None:
         """Forget what follows from the rest, after a snapshot was put back."""
-        self._grids, self._job, self._ended_way, self._way = {}, None, None, None
+        self._grids, self._lines, self._job, self._ended_way, self._way = {}, {}, None, None, None
 
     def moment(self) -> Moment:
         """Return the moment of the last firing, for `placed`."""

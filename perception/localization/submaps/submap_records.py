@@ -122,13 +122,18 @@ def odometry_link(of: int, moved: Floats, information: Floats) -> Structured:
     return row
 
 
-def match_link(of: int, to: int, pose: Floats, information: Floats, *, is_next: bool) -> Structured:
-    """Return a match of two maps, of which one may have been driven right after the other."""
+def unlost(pose: Floats, *, is_next: bool) -> tuple[Floats, Floats]:
+    """Return the pose of a match that has not lost way, and its derivative by the way lost, shapes (3,)."""
+    way = pose[:2] * (1.0 + LOST_WAY[not is_next])
+    return np.array([*way, pose[2]]), np.array([*way, 0.0])
+
+
+def match_link(of: int, to: int, pose: Floats, by_lost: Floats, information: Floats, *, is_next: bool) -> Structured:
+    """Return a match of two maps, of which one may have been driven right after the other; as of `unlost`."""
     row = zeros(Link, 1)
     row["of"], row["to"], row["is_match"], row["weight"] = of, to, 1, 1.0
-    way = pose[:2] * (1.0 + LOST_WAY[not is_next])
-    row["pose"], row["information"] = (*way, wrap_angle(pose[2])), information
-    row["by_scale"][0, OF_ODOMETRY if is_next else OF_OTHER] = *way, 0.0
+    row["pose"], row["information"] = (*pose[:2], wrap_angle(pose[2])), information
+    row["by_scale"][0, OF_ODOMETRY if is_next else OF_OTHER] = by_lost
     return row
 
 

@@ -12,7 +12,6 @@ from perception.localization.submaps.pose_graph import SCALES, Link
 from perception.localization.submaps.submap_records import (
     Submap,
     between,
-    match_link,
     node_at,
     odometry_link,
     pose_of,
@@ -20,6 +19,7 @@ from perception.localization.submaps.submap_records import (
 from perception.records import zeros
 from tests.perception.localization.submaps.test_local_grid import BEAM
 from tests.perception.localization.submaps.test_map_match import room_readings
+from tests.perception.localization.submaps.test_submap_records import matched
 
 INFORMATION = np.diag([400.0, 400.0, 900.0])
 
@@ -34,7 +34,7 @@ def two_maps(error: tuple[float, float, float] = (0.1, -0.05, 0.03)) -> Maps:
     submaps[1]["pose"] = moved + error
     nodes = np.concatenate([node_at(submaps[k]["pose"]) for k in range(2)])
     links = odometry_link(0, moved + error, np.diag([50.0, 50.0, 200.0]))
-    return Maps(submaps, nodes, links, np.zeros(SCALES), np.array([-70.0, 100.0]), {})
+    return Maps(submaps, nodes, links, np.zeros(SCALES), np.array([-70.0, 100.0]), {}, {})
 
 
 @pytest.mark.compiled
@@ -66,7 +66,7 @@ def test_caches_change_nothing() -> None:
 
 def test_the_first_map_has_nothing_to_be_compared_with() -> None:
     maps = two_maps()
-    alone = Maps(zeros(Submap, 1), maps.nodes[:1], zeros(Link, 0), np.zeros(SCALES), np.array([-70.0, 100.0]), {})
+    alone = Maps(zeros(Submap, 1), maps.nodes[:1], zeros(Link, 0), np.zeros(SCALES), np.array([-70.0, 100.0]), {}, {})
     *_, outcome = match_map(alone, BEAM)
     assert isinstance(outcome, Outcome)
     assert outcome.gain == 0.0
@@ -86,10 +86,10 @@ def test_way_that_all_matches_lose_refutes_no_odometry() -> None:
 
     def cost(factor: float, turn: float) -> float:
         links = [
-            match_link(of, to, pose * (factor, factor, 1.0) + (0.0, 0.0, turn), INFORMATION, is_next=False)
+            matched(of, to, pose * (factor, factor, 1.0) + (0.0, 0.0, turn), INFORMATION, is_next=False)
             for of, to, pose in moved
         ]
-        maps = Maps(submaps, nodes, np.concatenate(links), np.zeros(SCALES), np.array([-70.0, 100.0]), {})
+        maps = Maps(submaps, nodes, np.concatenate(links), np.zeros(SCALES), np.array([-70.0, 100.0]), {}, {})
         return map_job._cost_at_odometry(maps, np.empty((6, 3, 6 + SCALES)), np.empty((6, 3)))
 
     assert cost(0.99, 0.0) < 0.1

@@ -22,12 +22,12 @@ from perception.localization.submaps.submap_records import (
     LOST_WAY,
     between,
     compose,
-    match_link,
     node_at,
     odometry_link,
     scaled,
 )
 from perception.records import Structured, records
+from tests.perception.localization.submaps.test_submap_records import matched
 
 INFORMATION = np.diag([400.0, 300.0, 900.0])
 
@@ -66,9 +66,7 @@ def at_poses(poses: list[Floats]) -> Structured:
 
 def test_a_step_is_that_of_dense_algebra() -> None:
     poses, links = chain()
-    links = np.concatenate(
-        [links, match_link(0, 5, between(poses[0], poses[5]) + 0.1, 50.0 * np.eye(3), is_next=True)]
-    )
+    links = np.concatenate([links, matched(0, 5, between(poses[0], poses[5]) + 0.1, 50.0 * np.eye(3), is_next=True)])
     rng = np.random.default_rng(2)
     nodes = at_poses([pose + 0.05 * rng.normal(size=3) for pose in poses])
     held, at, scales, size = (
@@ -120,7 +118,7 @@ def test_matches_show_the_scales_of_odometry() -> None:
     true = np.array([-0.03, 0.04])
     poses, links = chain(12, true)
     matches = [
-        match_link(k, k + 4, between(poses[k], poses[k + 4]), 1e6 * np.eye(3), is_next=False) for k in range(0, 8, 2)
+        matched(k, k + 4, between(poses[k], poses[k + 4]), 1e6 * np.eye(3), is_next=False) for k in range(0, 8, 2)
     ]
     raw, _ = chain(12)
     scales, _ = solve(np.concatenate([links, *matches]), at_poses(raw))
@@ -133,8 +131,8 @@ def test_matches_show_the_scales_of_odometry() -> None:
 @pytest.mark.covered
 def test_a_wrong_match_loses_its_weight() -> None:
     poses, links = chain()
-    right = [match_link(k, k + 3, between(poses[k], poses[k + 3]), INFORMATION, is_next=False) for k in range(3)]
-    wrong = match_link(0, 6, between(poses[0], poses[6]) + np.array([2.0, -1.0, 0.5]), INFORMATION, is_next=False)
+    right = [matched(k, k + 3, between(poses[k], poses[k + 3]), INFORMATION, is_next=False) for k in range(3)]
+    wrong = matched(0, 6, between(poses[0], poses[6]) + np.array([2.0, -1.0, 0.5]), INFORMATION, is_next=False)
     links, nodes = np.concatenate([links, *right, wrong]), at_poses(poses)
     solve(links, nodes, 20)
     assert links["weight"][-1] < 0.05
