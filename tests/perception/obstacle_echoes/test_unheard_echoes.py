@@ -198,7 +198,6 @@ def test_few_sensors_that_turn_away_from_what_they_heard_have_not_lost_it() -> N
         assert ring.unheard.is_ring_silent == is_lost
 
 
-@pytest.mark.covered
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("robot", "is_frozen"), [("hobby3", False), ("parking12", False), ("parking12", True)])
 def test_walls_beside_a_ring_go_on_while_it_hears_nothing_new(robot: str, is_frozen: bool, seed: int) -> None:

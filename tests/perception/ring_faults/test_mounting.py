@@ -94,8 +94,9 @@ def test_ranges_that_may_be_longer_put_echoes_so_much_nearer() -> None:
     np.testing.assert_allclose(away, ranges - 0.5)
 
 
-@pytest.mark.covered
-@pytest.mark.parametrize("robot", ["p3dx", "amigo", "magellan"])
+@pytest.mark.parametrize(
+    "robot", ["p3dx", *(pytest.param(robot, marks=pytest.mark.covered) for robot in ("amigo", "magellan"))]
+)
 def test_an_honest_robot_that_winds_between_rough_walls_is_never_doubted(robot: str) -> None:
     """Such walls lean to the path, and sensors one behind the other hear them in other distances."""
     ring, x, y, path = load_settings("room", robot=robot).ring, 0.0, 0.0, list[tuple[float, float, float]]()

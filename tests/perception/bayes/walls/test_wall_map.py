@@ -47,7 +47,6 @@ def walls_after(world: WorldConfig, path: Floats, memory: Memory) -> Floats:
     return wall_ends(memory)
 
 
-@pytest.mark.covered
 @pytest.mark.parametrize("model", ["specular", pytest.param("cone", marks=pytest.mark.compiled)])
 def test_each_wall_of_a_room_is_found_once_and_its_doorway_stays_open(model: Reflection) -> None:
     acoustics = AcousticsConfig(model=model, noise_relative=0.01, dropout=0.05, outliers=0.03, outlier_max_m=5.0)

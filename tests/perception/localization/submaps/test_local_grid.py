@@ -64,7 +64,6 @@ def test_a_range_passes_the_area_of_its_cone() -> None:
     assert np.abs(passes - expected)[expected > 0.7].mean() < 0.25
 
 
-@pytest.mark.covered
 def test_silence_passes_a_part_and_hits_nothing() -> None:
     hits, passes = grid_of(np.array([[0.0, 0.0, 0.0, math.inf]]))
     assert hits.sum() == 0.0
