@@ -13,6 +13,10 @@ PYTEST := $(BIN)/python -m pytest -q
 PROCESSORS = $(shell nproc)
 LINES  := $(VENV)/lines
 NPM_BIN := $(VENV)/npm/node_modules/.bin
+# mypy looks for garbage after each 200,000 objects, which takes a quarter of its processor time (18 of 66 s); after each
+# 4 million it takes 6 s, and a third more memory (1.1 GB).
+MYPY = $(BIN)/python -c "import gc; gc.set_threshold(4_000_000, 30, 30); gc.set_threshold = lambda *_: None; \
+	from mypy.__main__ import console_entry; console_entry()"
 KERNELS = tests/perception tests/behaviors/valley tests/drivers/emulator
 BOUNDSCHECKED = $(sort $(shell grep -rl --include='test_*.py' mark.boundscheck tests))
 
@@ -43,7 +47,7 @@ check: lint
 lint: $(VENV)/test.stamp $(VENV)/npm.stamp
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
+	$(MYPY)
 	$(BIN)/lint-imports
 	$(BIN)/codespell
 	@if [ -x $(NPM_BIN)/tsc ]; then $(NPM_BIN)/biome ci --colors=off --config-path=.ci/page runtime/console/page \
