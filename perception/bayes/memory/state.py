@@ -196,6 +196,8 @@ class CircleTrack(Track):
     """Lead of a body of unknown outline, nat; 0 where it was not compared."""
     round_lead: Finite
     """Lead of a circle of unknown radius, nat; 0 where it was not compared."""
+    edge_lead: Finite
+    """How much likelier its readings are if it also answers where a beam's edge meets it, its centre past it, nat."""
     room_lead: Finite
     """Lead of the mapped walls and corners, nat."""
     sides: Annotated[int, up_to(BEARING_BINS)]
@@ -277,6 +279,8 @@ class State(Record):
     """Evidence of all objects' residuals for each noise."""
     rays: Annotated[int, up_to(RAYS_MAX)]
     """By how many rays bodies are heard here, 0: by their nearest points; see `inference.beam`."""
+    edge_nat: Finite
+    """What the circles, but for the one refined last, say for answers from beams' edges; see `inference.beam`."""
     tried_rays: Annotated[int, up_to(RAYS_MAX)]
     """By how many rays one that failed was tried last."""
     untried: Count
