@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from config.toml_edit import Place, TomlEditError, TomlValue, inline, with_value
+from tests.examples import examples
 
 ROBOT = """# mine
 robot.driver = "skippy"  # of a package
@@ -94,6 +95,7 @@ PLAIN = st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=F
 NESTED = st.recursive(PLAIN, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner))
 
 
+@examples(0.3)
 @given(NESTED)
 def test_a_value_on_one_line_says_the_same(value: object) -> None:
     text = inline(value)
