@@ -29,6 +29,8 @@ GRAZING_MIN: Final = 0.2
 EDGE_PRIOR_NAT: Final = -4.6
 """Log prior odds (a hundredth) that bodies past a beam answer from its edge as well. With a tenth, drums that are
 heard as mirrors are named .1 to .2 ft later."""
+NO_EDGES_NAT: Final = -1e9
+"""The same where they do not."""
 EDGE_LEAD_MAX_NAT: Final = 10.0
 """Most that one circle says for or against it, so that no wrong one decides for all."""
 EDGES: Final = 2
@@ -232,13 +234,12 @@ def ray_over_line(q: Reading, nx: float, ny: float, away: float, half_angle: flo
 
 @kernel
 def assume_rays(s: Records[State], p: Records[Settings], rays: int) -> None:
-    """Let what is predicted in the scratch from now on be heard by so many rays; 0: by the nearest point."""
+    """Let what is predicted in the scratch from now on be heard by so many rays; 0: by the nearest point alone."""
     scratch = s[0].scratch
     half_angle = p[0].half_angle_rad
     scratch.predicted.rays = scratch.own.rays = rays
     scratch.predicted.half_angle = scratch.own.half_angle = half_angle
-    edge_nat = EDGE_PRIOR_NAT + s[0].edge_nat
-    scratch.predicted.edge_nat = scratch.own.edge_nat = scratch.line_fit.edge_nat = edge_nat
+    scratch.predicted.edge_nat = scratch.own.edge_nat = scratch.line_fit.edge_nat = NO_EDGES_NAT
     scratch.line_fit.rays = rays
     scratch.line_fit.half_angle = half_angle
     for side in range(2):
@@ -249,12 +250,17 @@ def assume_rays(s: Records[State], p: Records[Settings], rays: int) -> None:
 
 @kernel
 def hear_edges(s: Records[State], tracks: Records[CircleTrack], but: int) -> None:
-    """Update what the circles, but for one, say for answers from beams' edges."""
+    """Let beams' edges answer in the scratch from now on, by what the circles, but for one, say for it.
+
+    Not where a circle is tried: by three rays the beam's edges are two of them, and only what fails is tried by rays.
+    """
     nat = 0.0
     for t in range(len(tracks)):
         if t != but and tracks[t].status == ESTABLISHED:
             nat += min(EDGE_LEAD_MAX_NAT, max(-EDGE_LEAD_MAX_NAT, tracks[t].edge_lead))
     s[0].edge_nat = nat
+    scratch = s[0].scratch
+    scratch.predicted.edge_nat = scratch.own.edge_nat = scratch.line_fit.edge_nat = EDGE_PRIOR_NAT + nat
 
 
 @kernel

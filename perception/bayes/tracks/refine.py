@@ -309,8 +309,8 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     track = tracks[t]
     n = copy_reservoir(track, s[0].scratch.readings)
     n = add_crosses(s, p, track.x, track.y, track.radius, s[0].scratch.readings, n)
-    hear_edges(s, tracks, t)
     assume_rays(s, p, s[0].rays)
+    hear_edges(s, tracks, t)
     n = keep_relevant(s, tracks, p, n, track.x, track.y, track.radius, t)
     track.reservoir = n
     track.unseen = 0

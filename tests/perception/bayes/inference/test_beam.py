@@ -106,10 +106,11 @@ def test_other_circles_say_whether_beams_edges_answer() -> None:
         [(ESTABLISHED, 3.0), (ESTABLISHED, -40.0), (TENTATIVE, 5.0), (ESTABLISHED, 2.0)]
     ):
         memory.tracks[t].status, memory.tracks[t].edge_lead = status, lead
-    beam.hear_edges(memory.s, memory.tracks, 3)
-    assert memory.s[0].edge_nat == 3.0 - beam.EDGE_LEAD_MAX_NAT
     beam.assume_rays(memory.s, P, 0)
     scratch = memory.s[0].scratch
+    assert scratch.predicted.edge_nat == beam.NO_EDGES_NAT
+    beam.hear_edges(memory.s, memory.tracks, 3)
+    assert memory.s[0].edge_nat == 3.0 - beam.EDGE_LEAD_MAX_NAT
     heard = (scratch.predicted, scratch.own, scratch.line_fit)
     assert all(it.edge_nat == beam.EDGE_PRIOR_NAT + memory.s[0].edge_nat for it in heard)
 
