@@ -108,6 +108,8 @@ class RobotProcess:
         The settings in force; a change applies from the next cycle on.
     in_thread : callable
         Calls a function in a thread that rests while a cycle is due.
+    is_connected : bool
+        Whether the robot was ready before the first cycle.
     """
 
     def __init__(
@@ -150,7 +152,7 @@ class RobotProcess:
         self._request: Request | None = None
         self._is_request_valid = always_valid
         self._edits, self._drive_inputs = list[Edit](), DriveInputs()
-        self._arm_when_ready = self._is_connected = False
+        self._arm_when_ready = self.is_connected = False
         self._footprint: Footprint | None = None
 
     def request(self, request: Request, is_valid: Callable[[], bool] = always_valid) -> None:
@@ -220,8 +222,8 @@ class RobotProcess:
         """
         with self.health.catching_unhandled_errors():
             await self._preparation.start(self._settings, self._connection, self._stop.is_set)
-            self._is_connected = self._driver.state is LineState.READY
-            if self._is_connected:  # else the run was ended before
+            self.is_connected = self._driver.state is LineState.READY
+            if self.is_connected:  # else the run was ended before
                 self._log.info("robot ready", port=self._settings.link.port, robot=self.name)
             link_task = asyncio.create_task(self._link.run(), name="link")
             self.health.watch_task("link", link_task)
@@ -265,8 +267,7 @@ class RobotProcess:
                     self._cycle(now)
                     if self._state.preparing is None:
                         recognised_run_s = min(recognised_run_s, now.run_s)
-                    end_run_s = self._clock()
-                    slack_s = scheduler.end(end_run_s)
+                    slack_s = scheduler.end(end_run_s := self._clock())
                     if not self._preparation.is_running:  # loading kernels leaves much garbage, and then all is kept
                         self._memory.cycle_done(slack_s)
                     self._link.hold(scheduler.quiet_s(end_run_s))
@@ -359,8 +360,7 @@ class RobotProcess:
         elif self._clock() <= stale_run_s:
             apply_command(self._driver, command)
             self._sender.send()
-            if self._clock() > stale_run_s:
-                # This process was suspended meanwhile: the base may move again that its deadman had stopped.
+            if self._clock() > stale_run_s:  # it was suspended: the base may move again that its deadman had stopped
                 self._halt()
 
     def _halt(self) -> None:
@@ -385,7 +385,7 @@ class RobotProcess:
 
     def _on_closed(self, reason: str) -> None:
         self._driver.line_closed()
-        if self._is_connected and not self._stop.is_set():
+        if self.is_connected and not self._stop.is_set():
             self._line_log.lost(reason, self._clock())
 
     async def _shut_down(self, link_task: asyncio.Task[None]) -> None:
@@ -394,7 +394,7 @@ class RobotProcess:
         self._clock.release()
         self.health.begin_shutdown()
         self._notifier.stopping()
-        if not await self._connection.shut_down() and self._is_connected:
+        if not await self._connection.shut_down() and self.is_connected:
             self._log.warning(self._line_messages.message(UNCONFIRMED_END))
         link_task.cancel()
         await asyncio.gather(link_task, return_exceptions=True)

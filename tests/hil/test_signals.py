@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import select
 import signal
 import socket
 import threading
@@ -24,7 +25,7 @@ from runtime.cli.app import run_command
 from runtime.recording.channels import LOG, SERIAL, SETTINGS, decode
 from runtime.recording.reader import open_recording
 from runtime.recording.schema import LogLine, SerialBytes
-from tests.hil.machine import stalls_excused
+from tests.hil.machine import TIMEOUT_S, stalls_excused
 from tests.hil.planted import planted
 from tests.hil.running import PATIENT, Running, emulated, running, wait_for
 from tests.hil.test_long_runs import WRAP_S
@@ -177,7 +178,8 @@ def test_a_run_that_is_ended_before_its_robot_is_ready_says_so_and_by_which_sign
     with running(
         tmp_path, "run", "run", "--port", os.ttyname(line), "--json", str(summary), "--no-record", "--no-console"
     ) as run:
-        assert os.read(robot, 1), "it calls the robot, which does not answer"
+        is_called, *_ = select.select([robot], [], [], TIMEOUT_S)
+        assert is_called, "it calls the robot, which does not answer"
         run.signal(signal.SIGINT)
         assert run.end() == 128 + signal.SIGINT
     os.close(line)

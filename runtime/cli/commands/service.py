@@ -39,6 +39,8 @@ TimeoutStartSec=300
 WatchdogSec=2
 # On SIGTERM it halts the base, then waits for the disk.
 KillSignal=SIGTERM
+# A run that is ended while it waits for kernels or for the robot exits with 128 + 15, which is no failure.
+SuccessExitStatus=143
 TimeoutStopSec=20
 Restart=on-failure
 RestartSec=2

@@ -160,7 +160,7 @@ async def run_process(
         for name, probe in {"recorder": recording.probe, "log": log_status.probe, "reload": reloader.probe}.items():
             process.health.watch(name, probe)
         summary = await process.run(arm=plan.is_armed, seconds=plan.seconds)
-        if not summary["cycles"]:
+        if not process.is_connected:
             why = "ended{} before the robot was ready"
             if ending:
                 raise UserError(why.format(f" by {ending[0].name}"), EXIT_CODE_BASE + ending[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import signal
 import subprocess
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from config.errors import DONE, WRONG_CALL
 from runtime.cli.app import run_command
 from runtime.cli.commands.service import quote_for_systemd
+from runtime.cli.first_signals import EXIT_CODE_BASE
 
 
 def test_the_unit_that_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -26,6 +28,7 @@ def test_the_unit_that_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "ExecReload=/bin/kill -HUP $MAINPID" in lines
     for line in ("Type=notify", "WatchdogSec=2", "Restart=on-failure", "DynamicUser=yes", "KillSignal=SIGTERM"):
         assert line in lines
+    assert f"SuccessExitStatus={EXIT_CODE_BASE + signal.SIGTERM}" in lines, "a stop before the robot is ready"
     if shutil.which("systemd-analyze") is not None:
         unit = tmp_path / "echolocate.service"
         unit.write_text(printed.out, "utf-8")
