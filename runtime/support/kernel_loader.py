@@ -62,7 +62,7 @@ KERNEL_COUNTS: Final = MappingProxyType(
         BAYES: 260,
         POLYGONS: 66,
         PAPER: 7,
-        LOCALIZATION: 24,
+        LOCALIZATION: 26,
         KNOWN_ROOM: 29,
         VALLEY: 2,
         SURFACES: 56,

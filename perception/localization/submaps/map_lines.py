@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from perception.angles import wrapped
+from perception.angles import ROUNDING_RAD, wrapped
 from perception.kernel import Floats, kernel
 from perception.localization.submaps.local_grid import ECHO_MAX_M, HALF_CELLS, SUBMAP_CELL_M
 
@@ -25,8 +25,8 @@ NORMAL_STEP_RAD: Final = 2.0 * math.pi / NORMALS
 DISTANCE_STEP_M: Final = 0.06
 """Step of the distances that are voted for, m."""
 DISTANCES: Final = 2 * int(HALF_CELLS * SUBMAP_CELL_M / DISTANCE_STEP_M)
-GRAZING_RAD: Final = math.radians(75.0)
-"""Angle between a beam's axis and a wall's normal beyond which the wall is not heard."""
+GRAZING_RAD: Final = math.radians(76.0)
+"""Angle between a beam's axis and a wall's normal beyond which the wall is not heard. Rings have sensors each 15°."""
 ON_LINE_M: Final = 0.08
 """An echo this near to a line may come from it."""
 LINE_ECHOES_MIN: Final = 16
@@ -58,8 +58,10 @@ SHARED_M: Final = 0.8
 FALSE_PAIRS: Final = 0.1
 """Share of pairs that are not of one wall."""
 LINE_ROUNDS: Final = 8
-POSE_ROUNDS: Final = 6
+POSE_ROUNDS: Final = 4
 """Steps to the line, and to the pose, that fits best."""
+VOTERS: Final = 256
+"""Readings that vote in one quantum."""
 FITS: Final = 2.0
 """In `taken`, of echoes of the line that is fitted."""
 NO_LINE, FOUND, DONE = range(3)
@@ -67,28 +69,29 @@ NO_LINE, FOUND, DONE = range(3)
 
 
 @kernel
-def vote(readings: Floats, count: int, half: float, taken: Floats, votes: Floats) -> None:
+def vote(readings: Floats, begin: int, end: int, half: float, taken: Floats, votes: Floats) -> None:
     """Count the echoes that each line may explain.
 
     Parameters
     ----------
-    readings, count, half
-        As of `local_grid.share_echoes`.
+    readings, begin, end, half
+        As of `local_grid.enter_passes`.
     taken : (n,) float
         Not zero for readings that are explained already.
     votes : (NORMALS, DISTANCES) float
-        Overwritten.
+        Updated.
     """
-    wide = int(GRAZING_RAD / NORMAL_STEP_RAD)
-    votes[:] = 0.0
-    for k in range(count):
+    wide = int(GRAZING_RAD / NORMAL_STEP_RAD) + 1
+    for k in range(begin, end):
         x, y, axis, range_m = readings[k]
         if taken[k] != 0.0 or range_m > ECHO_MAX_M:
             continue
         middle = round(axis / NORMAL_STEP_RAD)
         for number in range(middle - wide, middle + wide + 1):
             direction = number * NORMAL_STEP_RAD
-            beside = max(0.0, abs(direction - axis) - half)
+            if abs(direction - axis) > GRAZING_RAD:
+                continue
+            beside = max(0.0, abs(direction - axis) - half - ROUNDING_RAD)
             distance = math.cos(direction) * x + math.sin(direction) * y + range_m * math.cos(beside)
             j = math.floor(distance / DISTANCE_STEP_M) + DISTANCES // 2
             if 0 <= j < DISTANCES:
@@ -101,8 +104,10 @@ def fit_line(readings: Floats, count: int, half: float, taken: Floats, votes: Fl
 
     Parameters
     ----------
-    readings, count, half, votes
+    readings, half, votes
         As of `vote`.
+    count : int
+        How many readings there are.
     taken : (n,) float
         Updated.
     line : (LINE_FIELDS,) float
@@ -165,8 +170,10 @@ def _fit(readings: Floats, count: int, half: float, taken: Floats, line: Floats)
         if number < LINE_ECHOES_MIN or determinant <= 0.0:
             return 0
         line[4] = math.sqrt(error2 / number)
-        line[0] += min(0.1, max(-0.1, (d * u - b * v) / determinant))
-        line[1] += (a * v - b * u) / determinant
+        turn = (d * u - b * v) / determinant
+        share = min(1.0, NORMAL_STEP_RAD / max(abs(turn), ROUNDING_RAD))
+        line[0] += share * turn
+        line[1] += share * (a * v - b * u) / determinant
     return number
 
 
@@ -209,8 +216,10 @@ def find_lines(readings: Floats, half: float) -> Iterator[Floats]:
     count, found = len(readings), np.zeros((LINES_MAX, LINE_FIELDS))
     taken, votes, number = np.zeros(count), np.empty((NORMALS, DISTANCES)), 0
     for _ in range(3 * LINES_MAX):
-        vote(readings, count, half, taken, votes)
-        yield found[:number]
+        votes[:] = 0.0
+        for begin in range(0, count, VOTERS):
+            vote(readings, begin, min(begin + VOTERS, count), half, taken, votes)
+            yield found[:number]
         result = fit_line(readings, count, half, taken, votes, found[number])
         number += result == FOUND
         yield found[:number]
@@ -229,10 +238,73 @@ def moved_lines(lines: Floats, pose: Floats) -> Floats:
 
 
 @kernel
-def pull(before: Floats, lines: Floats, pose: Floats, covariance: Floats, system: Floats) -> float:
-    """Add what lines say of a map's pose; return how many of them are of one wall with a line before.
+def compare(one: Floats, other: Floats, pose: Floats, difference: Floats) -> bool:
+    """Compare a line of a map with one before, as of `pull`; return whether they may be of one wall.
 
-    Each counts with the probability that it is, and is compared with the line before that covers most of it.
+    Parameters
+    ----------
+    one, other : (LINE_FIELDS,) float
+        That of the map, and the one before.
+    pose : (3,) float
+        Of the map, m and rad.
+    difference : (7,) float
+        Overwritten: turn (rad) and distance (m) where both are, their variances, and the distance's derivatives by
+        the pose. Turn and distance are added as if they were independent.
+    """
+    normal = one[0] + pose[2]
+    c, s, turn = math.cos(normal), math.sin(normal), wrapped(normal - other[0])
+    shift = c * pose[1] - s * pose[0]
+    low, high = max(other[2], one[2] + shift), min(other[3], one[3] + shift)
+    at = 0.5 * (low + high)
+    off = one[1] + c * pose[0] + s * pose[1] - turn * at - other[1]
+    turn_variance, off_variance = _variances(one[2], one[3], one[4], at - shift)
+    other_turn, other_off = _variances(other[2], other[3], other[4], at)
+    difference[0], difference[1] = turn, off
+    difference[2] = turn_variance + other_turn
+    difference[3] = off_variance + other_off
+    difference[4], difference[5], difference[6] = c, s, shift - at
+    return high - low >= SHARED_M and abs(turn) <= PAIR_RAD and abs(off) <= PAIR_M
+
+
+@kernel
+def find_pairs(
+    before: Floats, lines: Floats, pose: Floats, covariance: Floats, difference: Floats, pairs: Floats
+) -> None:
+    """Find the line before that is most probably of one wall with each line of a map.
+
+    Parameters
+    ----------
+    before, lines, pose
+        As of `pull`.
+    covariance : (3, 3) float
+        Of the pose.
+    difference : (7,) float
+        Overwritten.
+    pairs : (n, 2) float
+        Overwritten: the number of that line, and the probability that it is; 0 where another wall is more probable.
+    """
+    for k in range(len(lines)):
+        pairs[k, 0] = pairs[k, 1] = 0.0
+        best = FALSE_PAIRS / (4.0 * PAIR_RAD * PAIR_M)
+        for n in range(len(before)):
+            if not compare(lines[k], before[n], pose, difference):
+                continue
+            turn, off, turn_variance, off_variance, x, y, theta = difference
+            place = x * x * covariance[0, 0] + 2.0 * x * y * covariance[0, 1] + y * y * covariance[1, 1]
+            both = x * covariance[0, 2] + y * covariance[1, 2]
+            a, b = covariance[2, 2] + turn_variance, both + theta * covariance[2, 2]
+            d = off_variance + place + theta * (both + b)
+            determinant = a * d - b * b
+            chi = (d * turn * turn - 2.0 * b * turn * off + a * off * off) / determinant
+            density = (1.0 - FALSE_PAIRS) * math.exp(-0.5 * chi) / (2.0 * math.pi * math.sqrt(determinant))
+            if density > best:
+                best, pairs[k, 0] = density, n
+                pairs[k, 1] = density / (density + FALSE_PAIRS / (4.0 * PAIR_RAD * PAIR_M))
+
+
+@kernel
+def pull(before: Floats, lines: Floats, pose: Floats, pairs: Floats, difference: Floats, system: Floats) -> None:
+    """Add what pairs of lines say of a map's pose.
 
     Parameters
     ----------
@@ -242,47 +314,19 @@ def pull(before: Floats, lines: Floats, pose: Floats, covariance: Floats, system
         Of the map.
     pose : (3,) float
         Of the map in that frame, m and rad.
-    covariance : (3, 3) float
-        Of the pose, as far as it is not known which lines are of one wall.
+    pairs : (n, 2) float
+        As of `find_pairs`.
+    difference : (7,) float
+        Overwritten.
     system : (3, 4) float
         Information and, in its last column, force: the information times the step to the pose. Updated.
     """
-    total = 0.0
     for k in range(len(lines)):
-        normal = lines[k, 0] + pose[2]
-        c, s = math.cos(normal), math.sin(normal)
-        distance = lines[k, 1] + c * pose[0] + s * pose[1]
-        shift = c * pose[1] - s * pose[0]
-        most, number, at, turn, off = SHARED_M, -1, 0.0, 0.0, 0.0
-        for n in range(len(before)):
-            low = max(before[n, 2], lines[k, 2] + shift)
-            shared = min(before[n, 3], lines[k, 3] + shift) - low
-            turned = wrapped(normal - before[n, 0])
-            apart = distance - turned * (low + 0.5 * shared) - before[n, 1]
-            if shared >= most and abs(turned) <= PAIR_RAD and abs(apart) <= PAIR_M:
-                most, number, at, turn, off = shared, n, low + 0.5 * shared, turned, apart
-        if number < 0:
-            continue
-        turn_variance, off_variance = _variances(lines[k, 2], lines[k, 3], lines[k, 4], at - shift)
-        other_turn, other_off = _variances(before[number, 2], before[number, 3], before[number, 4], at)
-        turn_variance += other_turn
-        off_variance += other_off
-        lever = shift - at
-        place = c * c * covariance[0, 0] + 2.0 * c * s * covariance[0, 1] + s * s * covariance[1, 1]
-        both = c * covariance[0, 2] + s * covariance[1, 2]
-        a, d = (
-            covariance[2, 2] + turn_variance,
-            off_variance + place + lever * (2.0 * both + lever * covariance[2, 2]),
-        )
-        b = both + lever * covariance[2, 2]
-        determinant = a * d - b * b
-        chi = (d * turn * turn - 2.0 * b * turn * off + a * off * off) / determinant
-        density = (1.0 - FALSE_PAIRS) * math.exp(-0.5 * chi) / (2.0 * math.pi * math.sqrt(determinant))
-        weight = density / (density + FALSE_PAIRS / (4.0 * PAIR_RAD * PAIR_M))
-        total += weight
-        _add(system, 0.0, 0.0, 1.0, weight / turn_variance, turn)
-        _add(system, c, s, lever, weight / off_variance, off)
-    return total
+        if pairs[k, 1] > 0.0:
+            compare(lines[k], before[int(pairs[k, 0])], pose, difference)
+            turn, off, turn_variance, off_variance, x, y, theta = difference
+            _add(system, 0.0, 0.0, 1.0, pairs[k, 1] / turn_variance, turn)
+            _add(system, x, y, theta, pairs[k, 1] / off_variance, off)
 
 
 @kernel
@@ -320,10 +364,11 @@ def with_lines(before: Floats, lines: Floats, pose: Floats, information: Floats)
         Of the match.
     """
     here, system = pose, np.column_stack([information, np.zeros(3)])
+    pairs, difference = np.empty((len(lines), 2)), np.empty(7)
     covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+    find_pairs(before, lines, pose, covariance, difference, pairs)
     for _ in range(POSE_ROUNDS):
         system[:, :3], system[:, 3] = information, information @ (pose - here)
-        pull(before, lines, here, covariance, system)
+        pull(before, lines, here, pairs, difference, system)
         here = here + np.linalg.solve(system[:, :3], system[:, 3])
-        covariance = np.zeros((3, 3))
     return here, system[:, :3].copy()

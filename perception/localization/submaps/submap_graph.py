@@ -250,7 +250,8 @@ class SubmapGraph:
         self._quanta, self._job = 0, None
         for number in list(self._grids)[:-GRIDS_MAX]:
             del self._grids[number]
-        self._lines.pop(self._matched - RUN_MAX, None)
+        for number in [one for one in self._lines if one < self._matched - RUN_MAX]:
+            del self._lines[number]
         self._spread[:] = spread_about(0, self._links.archived_rows, self._nodes.archived_rows)[-1]
 
     @property
