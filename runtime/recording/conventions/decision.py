@@ -182,7 +182,7 @@ def _asked_repeats(table: Table, options: RingLogOptions, set_size: int) -> Repe
     """Return how values are repeated, by the option or by the data; of `--latched yes` only what noise they have."""
     if options.latched == "auto":
         return find_repeats(table, set_size)
-    return Repeats(same=noise_of_repeats(table.ranges) if options.latched == "yes" else 0.0)
+    return Repeats(same=noise_of_repeats(table) if options.latched == "yes" else 0.0)
 
 
 def _without_repeats(ranges: Floats, same: float) -> Floats:

@@ -16,8 +16,9 @@ from drivers.messages import Firing
 from perception.localization.submaps.echo_lag import lag_of
 from runtime.recording.conventions.decision import Conventions, decide
 from runtime.recording.conventions.echo_lag import at_heard_poses, pose_between
+from runtime.recording.conventions.not_fired import option_of
 from runtime.recording.conventions.options import AUTO, RingLogOptions
-from runtime.recording.conventions.table import Table
+from runtime.recording.conventions.table import LENGTHS, Table
 from runtime.recording.ring_log import RingLogError, read_ring_log
 from runtime.recording.servo_columns import ServoColumns
 
@@ -116,7 +117,8 @@ def converted_firings(
     firings: Iterator[Firing] = (one if found.is_plain else found.converted(one) for one in every)
     if found.cycle_s is not None:
         firings = _without_repeats(firings, robot.ring, found.cycle_s, found.same_m)
-    yield from _checked(_at_heard_poses(firings, path, robot.ring, options, warn, rows=min(first, LAG_ROWS)), path)
+    firings = _at_heard_poses(firings, path, robot.ring, options, warn, rows=min(first, LAG_ROWS))
+    yield from _checked(firings, path, LENGTHS[found.units.range_])
 
 
 def _decided(seen: list[Firing], path: Path, robot: RobotConfig, options: RingLogOptions) -> Conventions:
@@ -208,8 +210,8 @@ def _at_heard_poses(
     yield from at_heard_poses(itertools.chain(begin, firings), lag_s)
 
 
-def _checked(firings: Iterable[Firing], path: Path) -> Iterator[Firing]:
-    """Yield the firings, once all conventions have been applied.
+def _checked(firings: Iterable[Firing], path: Path, unit_m: float) -> Iterator[Firing]:
+    """Yield the firings, once all conventions have been applied; `unit_m` is the file's unit of ranges.
 
     Raises
     ------
@@ -217,12 +219,12 @@ def _checked(firings: Iterable[Firing], path: Path) -> Iterator[Firing]:
         A range is still negative.
     """
     for firing in firings:
-        if (firing.ranges_m < 0.0).any():
-            is_nan = np.isneginf(firing.ranges_m).any()
-            what, word = ("nan", "nan") if is_nan else ("below 0", "that number")
+        if (wrong := firing.ranges_m[firing.ranges_m < 0.0]).size:
+            option = option_of(float(wrong.min()) / unit_m)
+            word = option.removeprefix("--not-fired ")
             raise RingLogError(
-                f"{path}: at t = {firing.robot_s!r}, a range is {what}; correct or delete the row, or say "
-                f"--not-fired {word} if the sensor did not fire then, or --silence {word} if it heard nothing"
+                f"{path}: at t = {firing.robot_s!r}, a range is {word}; correct or delete the row, or say "
+                f"{option} if the sensor did not fire then, or --silence {word} if it heard nothing"
             )
         yield firing
 

@@ -23,6 +23,8 @@ GLITCHES: Final = 0.02
 """Share of runs that may contradict: rows at uneven times."""
 LONGEST_RUN: Final = 24
 """Longest run of changes whose end is looked for: of a source that repeats less than that, hardly a value is old."""
+SHORT_RUN: Final = 2
+"""Runs of this length at most are decided before: by intervals between changes, and by three changes in a row."""
 ROWS_MIN: Final = 30
 REPEATED: Final = 0.3
 """Share of repeats, as the robot moves, from which a log that shows nothing else is ambiguous: ranges to the
@@ -69,7 +71,7 @@ def find_repeats(table: Table, set_size: int) -> Repeats:
     sensors = ranges.shape[1]
     if len(ranges) < ROWS_MIN or np.median((~np.isnan(ranges)).sum(axis=1)) <= set_size < sensors:
         return Repeats()
-    found = _repeats(ranges)
+    found = _repeats(ranges, table.moved)
     if found.rows > 1.0:
         return found
     changed, _ = _changes(ranges)
@@ -83,13 +85,17 @@ def find_repeats(table: Table, set_size: int) -> Repeats:
     return Repeats()
 
 
-def noise_of_repeats(ranges: Floats) -> float:
-    """Return by how much repeated values differ, in a log, (n, sensors), that is known to repeat them; 0 mostly."""
-    return _repeats(ranges).same
+def noise_of_repeats(table: Table) -> float:
+    """Return by how much repeated values differ, in a log that is known to repeat them; 0 mostly."""
+    return _repeats(table.ranges, table.moved).same
 
 
-def _repeats(ranges: Floats) -> Repeats:
-    """Return what the changes show: of values to the bit, or else of values but for their last digit."""
+def _repeats(ranges: Floats, moved: NDArray[np.bool_]) -> Repeats:
+    """Return what the changes show: of values to the bit, or else of values but for their last digit.
+
+    A run of changes that ends where the robot stands shows nothing: little changes there in a fresh log either. Where
+    poses come more rarely than rows, more than half of the sensors change in rows that repeat one value in three.
+    """
     for same in (0.0, DITHER * _least_change(ranges)):
         held = _without_dither(ranges, same) if same else ranges
         detector = RepeatDetector(ranges.shape[1])
@@ -98,18 +104,22 @@ def _repeats(ranges: Floats) -> Repeats:
         if detector.period > 1:
             return Repeats(float(detector.period), same)
         changed, great = _changes(held)
-        begins = great[:-2]
+        heard = np.maximum(1, (np.isfinite(held[1:]) & np.isfinite(held[:-1])).sum(axis=1))
+        shown = changed | (moved[1:] | (changed.sum(axis=1) > 0.5 * heard))[:, None]
+        begins = great[:-2] & shown[1:-1] & shown[2:]
         count = begins.sum(axis=0)
         runs = int((begins & changed[1:-1] & changed[2:]).sum())
         expected = float((count * changed.mean(axis=0) ** 2).sum())
         if runs <= GLITCHES * count.sum() and expected - runs > RUNS_NAT:
             return Repeats(1.5, same)  # each value stands for one row or two: no sensor changes three times in a row
-        if longest := _longest_run(held, changed, great):
+        if longest := _longest_run(held, changed, great, shown):
             return Repeats((longest + 1) / longest, same)
     return Repeats()
 
 
-def _longest_run(ranges: Floats, changed: NDArray[np.bool_], great: NDArray[np.bool_]) -> int:
+def _longest_run(
+    ranges: Floats, changed: NDArray[np.bool_], great: NDArray[np.bool_], shown: NDArray[np.bool_]
+) -> int:
     """Return how often in a row a sensor changes at most, where that ends all at once; 0 where it does not.
 
     Rows that come a little faster than the ring's cycle repeat one value in a few, and always after as many changes.
@@ -121,19 +131,22 @@ def _longest_run(ranges: Floats, changed: NDArray[np.bool_], great: NDArray[np.b
         Shape (n, sensors).
     changed, great
         As of `_changes`.
+    shown
+        Where a value that is not changed is one repeated, shape (n − 1, sensors).
     """
-    known = np.isfinite(ranges[1:]) & np.isfinite(ranges[:-1])
+    known = np.isfinite(ranges[1:]) & np.isfinite(ranges[:-1]) & shown
     runs = great & known
     follows = runs[:-1] & known[1:]
     goes_on = (follows & changed[1:]).sum(axis=0) / np.maximum(1, follows.sum(axis=0))
-    for length in range(1, LONGEST_RUN):
+    for length in range(1, LONGEST_RUN + 1):
         if len(runs) <= length:
             break
         runs = runs[:-1] & known[length:]
         count = runs.sum(axis=0)  # the runs of each sensor that are as long as this, before a known value
         runs = runs & changed[length:]
         longer = int(runs.sum())
-        if length > 2 and longer <= GLITCHES * count.sum() and float((count * goes_on).sum()) - longer > RUNS_NAT:
+        is_end = longer <= GLITCHES * count.sum() and float((count * goes_on).sum()) - longer > RUNS_NAT
+        if is_end and length > SHORT_RUN:
             return length
     return 0
 

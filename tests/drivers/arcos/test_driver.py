@@ -312,6 +312,8 @@ def test_firmware_without_a_configuration_gets_the_robot_files_limits() -> None:
     harness.ready()
     assert any("does not report its configuration" in note for note in harness.notes)
     assert not any("of which model" in note for note in harness.notes)
+    assert harness.driver.identity is not None
+    assert harness.driver.identity.deadman_s == 2.0
 
 
 def test_a_simulator_that_does_not_say_its_model_is_taken_for_the_files_and_that_is_said() -> None:
@@ -319,8 +321,6 @@ def test_a_simulator_that_does_not_say_its_model_is_taken_for_the_files_and_that
     harness.controller.name = RobotName("box")
     harness.ready()
     assert [note for note in harness.notes if "does not say of which model it is, likely it is a simulator" in note]
-    assert harness.driver.identity is not None
-    assert harness.driver.identity.deadman_s == 2.0
 
 
 def test_ranges_become_firings_with_times_and_poses(harness: Harness) -> None:

@@ -397,9 +397,10 @@ def test_a_robot_that_stands_has_not_moved_by_what_interpolation_rounds() -> Non
     assert list(converted_firings(rows, Path("log.csv"), drive.settings, AUTO, pytest.fail)) == rows
 
 
-@pytest.mark.parametrize(("value", "word"), [(-math.inf, "--not-fired nan"), (-3.0, "--not-fired that number")])
-def test_a_range_that_is_still_none_is_refused_with_the_options_that_settle_it(value: float, word: str) -> None:
+@pytest.mark.parametrize(("value", "number"), [(-math.inf, "nan"), (-3.0, "-300"), (-0.01, "-1")])
+def test_a_range_that_is_still_none_is_refused_with_the_options_that_settle_it(value: float, number: str) -> None:
     """Of a table that mixes nan and empty cells, the data may not show what nan stands for."""
     firing = Firing(2.5, Pose(0.0, 0.0, 0.0), 0.0, np.array([1.0, value, math.nan]))
-    with pytest.raises(RingLogError, match=f"at t = 2.5, a range is .* say {word}"):
-        list(_checked([firing], Path("log")))
+    said = f"at t = 2.5, a range is {number}; .* --not-fired {number} if .* --silence {number} if"
+    with pytest.raises(RingLogError, match=said):
+        list(_checked([firing], Path("log"), 0.01))
