@@ -210,17 +210,19 @@ class Decoder:
     ----------
     frames, bad
         Frames decoded, and headers that no valid frame follows.
+    has_eighth_bit
+        Whether any byte had its eighth bit set.
     """
 
     def __init__(self) -> None:
         self.frames = self.bad = 0
         self._pending = b""
-        self._has_eighth_bit = False
+        self.has_eighth_bit = False
 
     @property
     def lacks_eighth_bits(self) -> bool:
         """Whether the line passes on seven bits of a byte: the checksum, an XOR, is right then, and no value is."""
-        return not self._has_eighth_bit and self.frames >= _SEVEN_BIT_FRAMES
+        return not self.has_eighth_bit and self.frames >= _SEVEN_BIT_FRAMES
 
     @property
     def pending(self) -> int:
@@ -229,7 +231,7 @@ class Decoder:
 
     def feed(self, data: bytes) -> list[Frame]:
         """Return what `data` completes, in order; how the bytes are split makes no difference."""
-        self._has_eighth_bit = self._has_eighth_bit or max(data, default=0) > _SEVEN_BITS
+        self.has_eighth_bit = self.has_eighth_bit or max(data, default=0) > _SEVEN_BITS
         data, at, found = self._pending + data, 0, list[Frame]()
         while (start := data.find(HEADER, at)) >= 0:
             end = start + 9 + data[start + 5] if start + 5 < len(data) else len(data) + 1

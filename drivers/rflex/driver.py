@@ -304,8 +304,6 @@ class RflexDriver(Session[Measurements]):
             self._begin(LineState.DOWN, line_diagnostics.silence(silent_s, others=others, bad=bad, heard=self.heard))
         elif unanswered_s > 2.0 * link.silence_max_s:
             self._begin(LineState.DOWN, diagnostics.not_receiving(unanswered_s))
-        elif self._decoder.lacks_eighth_bits:
-            self._begin(LineState.DOWN, diagnostics.SEVEN_BITS)
         elif self._brake.mode is Mode.RELEASING and self._brake.tries > link.tries:
             self.halt()
             self._problem = diagnostics.BRAKE_STAYS_ON
@@ -343,7 +341,7 @@ class RflexDriver(Session[Measurements]):
                 pass
 
     def _take_axis(self, report: AxisReport) -> None:
-        """Take an axis; the first sample of a session with a status makes the line READY."""
+        """Take an axis; with a status and a byte of eight bits, the first sample makes the line READY."""
         flags = self._status()
         sample = self.stamper.axis(report, self._run_s, flags)
         if sample is Jump.BACK:
@@ -355,7 +353,7 @@ class RflexDriver(Session[Measurements]):
         self._brake.observe_speed(sample.twist)
         self._stall.observe(sample.twist, self._run_s)
         if self._state is not LineState.READY:
-            if self._brake.is_on is None:
+            if self._brake.is_on is None or not (self._decoder.has_eighth_bit or self._decoder.lacks_eighth_bits):
                 return
             self._meet()
         if self._state is LineState.READY:

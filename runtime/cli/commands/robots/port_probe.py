@@ -327,7 +327,8 @@ class _Listener:
     def found(self, at_s: float, open_s: float = 0.0) -> _Answer | None:
         """Return what was found out; None as long as more may come.
 
-        A driver that gives up is believed if the line has been open for so long (s) that a robot has started.
+        A driver that gives up is believed if the line has been open for so long (s) that a robot has started: what is
+        received before may be the end of what a board sent before it was restarted.
         """
         driver = self.driver
         has_answered, waited_s = driver.counts.frames > 0, at_s - self._begin_s
@@ -336,10 +337,11 @@ class _Listener:
         if self.is_ready:
             answer = self.look(at_s)
             return answer if answer.is_whole or at_s - self._ready_s >= LOOK_S else None
-        if has_answered and (driver.state is LineState.DOWN or waited_s > READY_MAX_S):
-            return _Answer(has_answered=True, problem=driver.problem or UNREADY, is_other=_is_other(driver))
-        has_given_up = driver.state is LineState.DOWN and waited_s > LEAST_S and open_s > ANSWER_MAX_S
-        if not has_answered and (has_given_up or waited_s > self._answer_max_s):
+        is_down, is_other, is_late = driver.state is LineState.DOWN, _is_other(driver), waited_s > self._answer_max_s
+        has_given_up = is_down and (is_late or (waited_s > LEAST_S and open_s > ANSWER_MAX_S))
+        if has_answered and (has_given_up or (is_down and is_other) or waited_s > READY_MAX_S):
+            return _Answer(has_answered=True, problem=driver.problem or UNREADY, is_other=is_other)
+        if not has_answered and (has_given_up or is_late):
             return _Answer(has_answered=False)
         return None
 

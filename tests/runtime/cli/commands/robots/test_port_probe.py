@@ -124,6 +124,18 @@ async def test_what_has_answered_and_is_not_ready_is_said_also_behind_a_calibrat
     assert found._replace(events=()) == port_probe._Answer(has_answered=True, problem=answer[0], is_other=answer[1])
 
 
+def test_frames_before_a_board_restarts_are_no_answer_until_it_had_time_to_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Opening its port restarts it: a driver that gave up meanwhile reaches it later on the same line."""
+    driver: Any = Answering(LineState.DOWN, "no answer", is_other_robot=False)
+    monkeypatch.setattr(port_probe, "make_driver", lambda _config: driver)
+    for max_s, early, late in ((port_probe.ANSWER_MAX_S, (1.5, 1.5), (1.0, 3.1)), (1.3, (1.2, 1.2), (1.4, 1.4))):
+        listener = port_probe._Listener(load_robot("hobby8"), max_s)
+        assert listener.found(*early) is None
+        assert listener.found(*late) == port_probe._Answer(has_answered=True, problem="no answer")
+
+
 async def test_a_socket_has_no_speeds_so_that_its_families_are_those_of_the_drivers(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
