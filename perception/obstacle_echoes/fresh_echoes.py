@@ -315,8 +315,6 @@ class FreshEchoes:
             self._agreed,
             self.unheard.records,
         )
-        reception, robot_s = (core, self._heard_reach_m, self._radius_m), float(firing.robot_s)
-        self.unheard.remembered.enter(firing.ranges_m, mounts, pose, robot_s, reception, self._agreed)
         heard_new = not self.unheard.silences[UNCHANGED]
         contradict_echoes(
             firing.ranges_m,

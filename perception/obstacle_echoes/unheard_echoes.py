@@ -25,7 +25,6 @@ from drivers.messages import Pose
 from perception.bounds import COUNT, PLACE, Flag, Place, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
 from perception.obstacle_echoes.blind_walls import TURN_DIRECTIONS, WIDTH_RAD, BlindWalls, middle_walls
-from perception.obstacle_echoes.remembered_echoes import RememberedEchoes
 from perception.records import Record, Records, records, zeros
 from perception.sensor_mounts import RingPose
 
@@ -257,7 +256,6 @@ class UnheardEchoes:
         self._are_steady = self._echoes["is_steady"]
         self.silences = np.zeros(2, np.int64)
         self._walls_m = np.full(TURN_DIRECTIONS, math.inf)
-        self.remembered = RememberedEchoes(len(mounts))
 
     def falls_silent(self, which: int) -> bool:
         """Return whether half of the ring's sensors have looked since it heard anything (new), and not all twice."""
@@ -344,5 +342,4 @@ class UnheardEchoes:
     def clear(self) -> None:
         """Forget all echoes and walls."""
         self._echoes["state"] = NOT_KEPT
-        self.remembered.clear()
         self._walls_m[:] = math.inf

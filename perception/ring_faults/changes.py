@@ -53,8 +53,6 @@ class Expected(Record):
     """The share of an honest sensor's readings that are not as expected."""
     honest_nat: Annotated[float, FINITE]
     """The logarithm of the density of what an honest sensor reads."""
-    length_nat: Annotated[float, FINITE]
-    """Evidence that it reads longer or shorter by the length that is tried, nat; 0 for none."""
 
 
 @kernel
@@ -221,64 +219,25 @@ def weigh_exchange(
 
 
 @kernel
-def shared(i: int, half_angle: float, echoes: Records[EchoTrace], expected: Records[Expected]) -> float:
-    """Return how many sensors have evidence of what sensor `i` hears: itself, and by their part those that overlap.
-
-    Parameters
-    ----------
-    i : int
-        The sensor.
-    half_angle, echoes
-        As for `weigh_changes`.
-    expected
-        With the evidence of each sensor; 0 for one that has none.
-    """
-    count = 0.0
-    for j in range(len(echoes)):
-        if expected[j].length_nat != 0.0:
-            off = abs(wrapped(echoes[j].latest.axis - echoes[i].latest.axis))
-            count += max(0.0, 1.0 - off / (2.0 * half_angle))
-    return max(1.0, count)
-
-
-@kernel
-def weigh_length(
-    k: int, half_angle: float, reach: float, echoes: Records[EchoTrace], expected: Records[Expected]
-) -> float:
+def weigh_length(k: int, reach: float, echoes: Records[EchoTrace], expected: Records[Expected]) -> float:
     """Return the evidence that all ranges are longer or shorter by as much as that of sensor `k`, nat.
-
-    Sensors whose beams overlap hear the same surface: each counts by its part.
 
     Parameters
     ----------
     k : int
         The sensor, of which an echo was expected elsewhere.
-    half_angle, reach, echoes
+    reach, echoes, expected
         As for `weigh_changes`.
-    expected
-        The evidence of each sensor is overwritten.
     """
-    longer = longer_by(k, echoes, expected)
+    longer = echoes[k].latest.range_m - 0.5 * (expected[k].low + expected[k].high)
+    # Any length is as likely.
+    evidence = math.log((1.0 - expected[k].missed) / (2.0 * reach)) - expected[k].honest_nat
     for i in range(len(echoes)):
         one = expected[i]
-        one.length_nat = 0.0
-        if i == k:  # any length is as likely
-            one.length_nat = math.log((1.0 - one.missed) / (2.0 * reach)) - one.honest_nat
-        elif one.source >= 0 and one.high >= 0.0:
+        if i != k and one.source >= 0 and one.high >= 0.0:
             low, high = max(0.0, one.low + longer), max(0.0, one.high + longer) + WINDOW_MIN_M
-            likely = density(echoes[i].latest.range_m, low, high, reach, one.missed)
-            one.length_nat = math.log(likely) - one.honest_nat
-    evidence = 0.0
-    for i in range(len(echoes)):
-        if expected[i].length_nat != 0.0:
-            evidence += expected[i].length_nat / shared(i, half_angle, echoes, expected)
+            evidence += math.log(density(echoes[i].latest.range_m, low, high, reach, one.missed)) - one.honest_nat
     return evidence
-
-
-@kernel
-def longer_by(k: int, echoes: Records[EchoTrace], expected: Records[Expected]) -> float:
-    """Return by how much the range of sensor `k` is longer than expected, m."""
-    return float(echoes[k].latest.range_m - 0.5 * (expected[k].low + expected[k].high))
 
 
 @kernel
@@ -290,7 +249,7 @@ def weigh_changes(
     missed: tuple[float, float],
     echoes: Records[EchoTrace],
     expected: Records[Expected],
-) -> tuple[int, float, float, float]:
+) -> tuple[int, float]:
     """Return the common change that explains the newest readings best, and the evidence for it, nat.
 
     Parameters
@@ -307,27 +266,24 @@ def weigh_changes(
 
     Returns
     -------
-    (int, float, float, float)
-        One of the changes, and the logarithm of its likelihood over that of an honest ring; by what length all ranges
-        are most likely longer, m, and the evidence for that. Sensors whose beams overlap hear the same surface, and
-        together count as one.
+    (int, float)
+        One of the changes, and the logarithm of its likelihood over that of an honest ring. Sensors whose beams
+        overlap hear the same surface, and together count as one.
     """
-    found, most, longer, longer_nat = NO_CHANGE, 0.0, 0.0, 0.0
+    found, most = NO_CHANGE, 0.0
     if not compare(half_angle, tolerance, reach, missed, mounts, echoes, expected):
-        return found, most, longer, longer_nat
+        return found, most
     for k in range(len(echoes)):
         if expected[k].source >= 0 and expected[k].is_off:
-            nats = weigh_length(k, half_angle, reach, echoes, expected)
+            nats = weigh_length(k, reach, echoes, expected)
             if nats > most:
                 found, most = LENGTHENED, nats
-                longer, longer_nat = longer_by(k, echoes, expected), nats
-    overlap = max(1.0, len(echoes) * half_angle / math.pi)
     for part in range(1, TURNS):
         turn = math.tau * part / TURNS
-        nats = weigh_exchange(turn, half_angle, tolerance, reach, mounts, echoes, expected) / overlap
+        nats = weigh_exchange(turn, half_angle, tolerance, reach, mounts, echoes, expected)
         if nats > most:
             found, most = EXCHANGED, nats
-    return found, most, longer, longer_nat
+    return found, most / max(1.0, len(echoes) * half_angle / math.pi)
 
 
 @kernel

@@ -112,10 +112,6 @@ class RingTrace(Record):
     """Evidence that the ring is mounted turned by so many quarters, nat."""
     excluded_nat: Annotated[Floats, QUARTERS, FINITE]
     """Evidence that it is not, nat, since the start or the last reset of the odometry; kept where it suffices."""
-    longer_m: Place
-    """By how much all ranges may have become longer at once, m; 0 where nothing says so."""
-    longer_nat: Annotated[float, POSITIVE]
-    """The evidence for it, nat."""
     misses: Annotated[Floats, LOOK_KINDS, POSITIVE]
     """Looks of each kind that missed a known echo."""
     looks: Annotated[Floats, LOOK_KINDS, POSITIVE]

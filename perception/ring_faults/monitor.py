@@ -22,8 +22,7 @@ All but the changes at once are sequential tests, with one threshold for all,
 `perception.ring_faults.memory.EVIDENCE_NAT`. The same threshold names a single sensor that repeats its reading
 while no wall along the path may answer it: a frozen ring may have heard a single echo.
 A lie that agrees with the motion, as ranges that are all too long by the same amount do, can be found only as it
-begins. Where few echoes then say so (`motion_tests.LONGER_NAT`), what would be ahead if they were limits the speed,
-until a range is too short for that.
+begins.
 """
 
 from __future__ import annotations
@@ -184,7 +183,7 @@ class RingMonitor:
         self._wiring = Wiring(self._turned_looks, self._turned_counts, self._exchanged_nat)
         self._near = np.zeros((wired * LOOKS, 3))
         self._turn_nat = np.zeros((wired, wired + 1))
-        self._places = np.zeros((len(ring.mounts) * (QUARTERS + 1), 2))
+        self._places = np.zeros((len(ring.mounts) * QUARTERS, 2))
         self._found = NOTHING
 
     def observe(self, firing: Firing) -> int | None:
@@ -239,9 +238,7 @@ class RingMonitor:
         return None if found == NOTHING else REASONS[found]
 
     def possible_obstacles(self) -> Floats:
-        """Return where the last echoes came from if the ring is turned or its ranges are too long: (k, 2), m.
-
-        As far as that is not excluded.
+        """Return where the last echoes came from if the ring is turned, as far as that is not excluded: (k, 2), m.
 
         One sensor on a servo looks in each direction too seldom to exclude it, and nothing is returned.
         """
@@ -249,11 +246,6 @@ class RingMonitor:
             return self._places[:0]
         found = possible_places(self._mounts, self._echo_records, self._ring_records, self._places)
         return self._places[:found]
-
-    @property
-    def longer_m(self) -> float:
-        """By how much all ranges may have become longer at once, m; 0 where nothing says so."""
-        return float(self._ring[0]["longer_m"])
 
     @property
     def is_doubted(self) -> bool:

@@ -46,10 +46,6 @@ from perception.sensor_mounts import RingPose
 
 CHANGE_NAT: Final = math.log(3e5 / 0.002)
 """`EVIDENCE_NAT` for changes from one round of the firing pattern to the next, of which a day has 3·10⁵, nat."""
-LONGER_NAT: Final = 6.0
-"""Evidence that all ranges have become longer at once, nat, with which the robot drives as if they had."""
-LONGER_MIN_M: Final = 0.15
-"""Ranges that are longer by less than the clearance that robots keep bring none to anything, m."""
 REPLAY_NAT: Final = EVIDENCE_NAT + math.log(PAST_LOOKS)
 """The same for a replay, of which each lag is tested, nat."""
 RESTART_M: Final = 0.25
@@ -218,25 +214,10 @@ def begin_evidence(all_of: RingTrace) -> None:
     """Drop all evidence; what is known of the ring's misses stays."""
     all_of.standstill += 1
     all_of.repeated_nat = all_of.equal_nat = 0.0
-    all_of.longer_m = all_of.longer_nat = 0.0
     all_of.missed_nat[:] = 0.0
     for quarter in range(QUARTERS):
         all_of.turned_nat[quarter] = min(0.0, all_of.turned_nat[quarter])
     all_of.silent = all_of.elsewhere = 0
-
-
-@kernel
-def doubt_length(longer: float, nat: float, all_of: RingTrace) -> None:
-    """Keep by how much all ranges may have become longer at once, m, if the evidence, nat, is the most so far."""
-    if longer > LONGER_MIN_M and nat >= max(LONGER_NAT, all_of.longer_nat):
-        all_of.longer_m, all_of.longer_nat = longer, nat
-
-
-@kernel
-def trust_length(c: EchoTrace, r: float, all_of: RingTrace) -> None:
-    """Drop that doubt for a steady echo of a sensor, range `r` in m, that is shorter than the length."""
-    if 0.0 <= r < all_of.longer_m and c.agreed > 0:
-        all_of.longer_m = all_of.longer_nat = 0.0
 
 
 @kernel
@@ -310,16 +291,12 @@ def check_motion(
         nats = weigh_replay(i, look, heard_before, reception, past)
         replayed = max(replayed, nats)
         weigh_look(i, look, is_ahead, reception, echoes, all_of)
-        trust_length(echoes[i], r, all_of)
         if r >= 0.0:
             weigh_change(i, look, yaw, mounts, reception, echoes, all_of)
     found = REPEATED if replayed >= REPLAY_NAT else conclusion(all_of)
     if found == NOTHING:
         missed = (honest_share(all_of, STEADY), honest_share(all_of, TURNING))
-        change, nats, longer, longer_nat = weigh_changes(
-            mounts, half_angle, tolerance, reach, missed, echoes, expected
-        )
-        doubt_length(longer, longer_nat, all_of)
+        change, nats = weigh_changes(mounts, half_angle, tolerance, reach, missed, echoes, expected)
         if change != NO_CHANGE and nats >= CHANGE_NAT:
             found = CHANGED + change
     if found != NOTHING:

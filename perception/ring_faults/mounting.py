@@ -139,8 +139,7 @@ def weigh_change(
 def possible_places(mounts: Floats, echoes: Records[EchoTrace], ring: Records[RingTrace], places: Floats) -> int:
     """Enter the places of the last echoes as each turned mounting has them that is not excluded; return how many.
 
-    A silence does not remove an echo: a ring that is turned comes nearer to what it seems to leave behind. Where all
-    ranges may have become longer, the places that are so much nearer are entered as well.
+    A silence does not remove an echo: a ring that is turned comes nearer to what it seems to leave behind.
 
     Parameters
     ----------
@@ -148,25 +147,24 @@ def possible_places(mounts: Floats, echoes: Records[EchoTrace], ring: Records[Ri
         As for `motion_tests.check_motion`.
     ring : (1,) record
         What is remembered of the ring.
-    places : (n · (QUARTERS + 1), 2) float
+    places : (n · QUARTERS, 2) float
         The first ones are the places x, y, m. Overwritten.
     """
     all_of, count = ring[0], 0
-    for quarter in range(QUARTERS + 1):
-        longer = all_of.longer_m if quarter == 0 else 0.0
-        if longer <= 0.0 if quarter == 0 else all_of.excluded_nat[quarter - 1] >= EXCLUDED_NAT:
+    for quarter in range(1, QUARTERS + 1):
+        if all_of.excluded_nat[quarter - 1] >= EXCLUDED_NAT:
             continue
         c, s = math.cos(0.5 * math.pi * quarter), math.sin(0.5 * math.pi * quarter)
         for i in range(len(echoes)):
             heard = echoes[i].heard
-            if heard.range_m < longer or not echoes[i].is_known or all_of.path_m - heard.path_m > ECHO_KEPT_M:
+            if heard.range_m < 0.0 or not echoes[i].is_known or all_of.path_m - heard.path_m > ECHO_KEPT_M:
                 continue
             yaw = heard.axis - mounts[i, 2]
             dx = math.cos(yaw) * mounts[i, 0] - math.sin(yaw) * mounts[i, 1]
             dy = math.sin(yaw) * mounts[i, 0] + math.cos(yaw) * mounts[i, 1]
             x, y = heard.x - dx, heard.y - dy  # the ring's centre
-            dx += (heard.range_m - longer) * math.cos(heard.axis)
-            dy += (heard.range_m - longer) * math.sin(heard.axis)
+            dx += heard.range_m * math.cos(heard.axis)
+            dy += heard.range_m * math.sin(heard.axis)
             places[count, 0], places[count, 1] = x + c * dx - s * dy, y + s * dx + c * dy
             count += 1
     return count

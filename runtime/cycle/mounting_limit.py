@@ -5,8 +5,6 @@ is turned may meet a wall before. So it drives as the worst of the mountings all
 echoes, turned about the ring's centre, limit the speed at which it comes nearer to them. The turn stays as it was
 decided, so the curve becomes narrower: turning on the spot comes nearer to nothing, and a curve that is slowed down
 as a whole would hold the robot beside what it should turn from. In free space nothing changes.
-
-Where all ranges may have become longer, the echoes limit the speed in the same way from where they would then be.
 """
 
 from __future__ import annotations
@@ -22,10 +20,6 @@ from runtime.cycle.unheard_limit import CREEP_M_S
 MOUNTED: Final = (
     "the robot drives slowly for its first way beside what it hears, until the changes of the ranges show that the "
     "ring is mounted as the robot file says"
-)
-LONGER: Final = (
-    "all ranges seem to have become longer at once: the robot drives slowly where something would be ahead if they "
-    "had, until one is too short for that; if this lasts, check the ring's controller and the odometry for a jump"
 )
 DOUBTED: Final = (
     "the ranges change as if the ring were mounted turned: the robot drives slowly until more of them decide it; if "
@@ -67,6 +61,4 @@ def limit_by_mounting(
             limit = min(limit, closing * away / ahead)
     if limit >= speed:
         return twist, why
-    return Twist(
-        math.copysign(max(CREEP_M_S, limit), twist.v), twist.w
-    ), MOUNTED if monitor.longer_m == 0.0 else LONGER
+    return Twist(math.copysign(max(CREEP_M_S, limit), twist.v), twist.w), MOUNTED

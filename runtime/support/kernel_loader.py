@@ -58,7 +58,7 @@ WARM_UP: Final = "runtime.support.kernel_warmup"
 
 KERNEL_COUNTS: Final = MappingProxyType(
     {
-        RING: 90,
+        RING: 84,
         BAYES: 260,
         POLYGONS: 66,
         PAPER: 7,

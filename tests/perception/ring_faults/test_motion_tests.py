@@ -108,19 +108,6 @@ def test_a_length_that_comes_to_all_ranges_is_named_in_that_round() -> None:
         assert ring.fire(honest(ring.x) + length) == NOTHING, "from then on they agree with the motion"
 
 
-def test_a_length_that_few_echoes_have_in_common_is_doubted_until_one_is_too_short_for_it() -> None:
-    ring, length = Ring(MOUNTS[::6]), 0.4572
-    ring.memory["misses"], ring.memory["looks"] = 150.0, 500.0
-    for k in range(40):
-        assert ring.fire(honest(ring.x)[::6] + (length if k >= 20 else 0.0)) == NOTHING
-        assert ring.memory["longer_m"][0] == pytest.approx(0.0 if k < 20 else length, abs=0.06)
-    short = np.where(np.arange(4) == 2, 0.4, honest(ring.x)[::6])
-    ring.fire(short)
-    assert ring.memory["longer_m"][0] > 0.0, "one reading may be a stray"
-    ring.fire(short)
-    assert ring.memory["longer_m"][0] == 0.0
-
-
 def test_a_ring_that_is_turned_on_the_way_is_named_in_that_round() -> None:
     for part in (3, 6, 12, 18):
         ring = after(0.5)

@@ -10,7 +10,7 @@ import pytest
 from config.load import load_settings
 from drivers.messages import Firing, Pose, Twist
 from perception.ring_faults.monitor import RingMonitor
-from runtime.cycle.mounting_limit import DOUBTED, LONGER, MOUNTED, limit_by_mounting
+from runtime.cycle.mounting_limit import DOUBTED, MOUNTED, limit_by_mounting
 from runtime.cycle.unheard_limit import CREEP_M_S
 
 SETTINGS = load_settings("room", robot="denning")
@@ -64,13 +64,6 @@ def test_a_ring_that_seems_turned_drives_slowly_everywhere_and_one_that_does_not
             if monitor.is_doubted:
                 break
         assert limit_by_mounting(FAST, None, pose, monitor, SETTINGS) == expected
-
-
-def test_ranges_that_may_have_become_longer_limit_the_speed_ahead() -> None:
-    monitor = heard(0.0, CLEAR_M + 0.4)
-    assert limited(monitor) == (FAST, None)
-    monitor._ring["longer_m"] = 0.4
-    assert limited(monitor) == (Twist(CREEP_M_S, FAST.w), LONGER)
 
 
 def test_a_reason_that_was_given_before_stays() -> None:
