@@ -76,13 +76,13 @@ class Link:
         open_timeout_s: float = _OPEN_TIMEOUT_S,
     ) -> None:
         self._config = config
-        self._on_opened = on_opened
-        self._on_data = on_data
-        self._on_closed = on_closed
+        self._on_opened, self._on_data, self._on_closed = on_opened, on_data, on_closed
         self.opener = opener
         self._open_timeout_s = open_timeout_s
         self._line: _Connection | None = None
         self._last_error: str | None = None
+        self.has_hung_up = False
+        """Whether the other end ended or reset the line that was lost last."""
         self._baud = config.baud
 
     @property
@@ -205,9 +205,9 @@ class Link:
     def _received(self, data: bytes) -> None:
         self._guard("received data", self._on_data, data)
 
-    def _lost(self, reason: str) -> None:
+    def _lost(self, reason: str, *, has_hung_up: bool) -> None:
         self._line = None
-        self._last_error = reason
+        self._last_error, self.has_hung_up = reason, has_hung_up
         self._guard("closing", self._on_closed, reason)
 
     def _guard(self, what: str, call: Callable[P, None], *args: P.args, **kwargs: P.kwargs) -> None:
@@ -286,7 +286,7 @@ class _Transport(serial_asyncio.SerialTransport):  # type: ignore[misc]  # the l
         if data:
             self._protocol.data_received(data)
         elif is_certain:
-            self._abort(OSError("its other end is closed"))
+            self._abort(ConnectionResetError("its other end is closed"))
 
     def write(self, data: bytes) -> None:
         """Send bytes at once as far as the line accepts them; the rest waits in the buffer of the library."""
@@ -316,8 +316,7 @@ class _Connection(asyncio.Protocol):
 
     def __init__(self, link: Link, port: Port) -> None:
         self.has_received = False
-        self.opened = asyncio.Event()
-        self.lost = asyncio.Event()
+        self.opened, self.lost = asyncio.Event(), asyncio.Event()
         self._link = link
         self._drained = asyncio.Event()
         """Set while no byte waits in this process."""
@@ -368,7 +367,7 @@ class _Connection(asyncio.Protocol):
         self.opened.set()
         self.lost.set()
         self._drained.set()
-        self._link._lost(reason)
+        self._link._lost(reason, has_hung_up=self._reason is None and isinstance(exc, ConnectionError))
 
     def set_baud(self, baud: int) -> None:
         """Set the port's speed; end the connection if it refuses."""

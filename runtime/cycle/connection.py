@@ -75,12 +75,10 @@ class Connection(NamedTuple):
 
     def _why_lost(self) -> str | None:
         """Return why the line that was opened is closed; None while it is open."""
-        link, heard = self.link, getattr(self.driver, "heard", None)
-        if link.is_open or link.last_error is None:
+        if self.link.is_open or self.link.last_error is None:
             return None
-        stranger = heard.stranger if isinstance(heard, HeardBytes) else None
-        is_network = link.config.port is not None and is_tcp(link.config.port)
-        return stranger or (explain_hang_up(str(link.config.port)) if is_network else link.last_error)
+        heard = getattr(self.driver, "heard", None)
+        return (heard.stranger if isinstance(heard, HeardBytes) else None) or why_ended(self.link, self.driver)
 
     def refuse_missing(self) -> None:
         """Raise what `connect` would raise if there is no such port; nothing is opened.
@@ -128,3 +126,20 @@ class Connection(NamedTuple):
                 return True
             deadline_run_s = max(deadline_run_s, begin_run_s + answer_max_s + stop_s(odometry.twist, self.body))
         return False
+
+
+def why_ended(link: Link, driver: RobotDriver) -> str | None:
+    """Return why a line that was opened is closed; None if it was not lost.
+
+    A connection that its other end ends before any frame came may be to another program; any other loss is a loss.
+    """
+    port = link.config.port
+    if (
+        link.last_error is None
+        or port is None
+        or not is_tcp(port)
+        or driver.counts.frames > 0
+        or not link.has_hung_up
+    ):
+        return link.last_error
+    return explain_hang_up(port)

@@ -64,6 +64,7 @@ async def test_bytes_go_both_ways_and_leave_at_once(peer: TcpPeer) -> None:
             await asyncio.wait_for(link.stop(), TIMEOUT_S)
             assert robot.recv(64) == b"halt", "the last bytes are sent before it closes"
     assert await soon(host.closed) == "closed by this program"
+    assert not link.has_hung_up
 
 
 async def test_a_held_line_is_not_read_until_it_is_released(peer: TcpPeer) -> None:
@@ -99,6 +100,7 @@ async def test_a_lost_connection_is_reported_and_made_again(peer: TcpPeer, how: 
             robot.close()
             reason = await soon(host.closed)
             assert f"the line {peer.url} was lost (" in reason
+            assert link.has_hung_up
             assert "\n" not in reason
             assert not link.send(b"gone")
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import itertools
 import random
-from collections.abc import Callable, MutableMapping
+from collections.abc import Awaitable, Callable, MutableMapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NoReturn
 
 import pytest
@@ -17,10 +18,11 @@ from config.load import load_settings
 from drivers.base_model import stop_s
 from drivers.emulator.faults import Deaf, Fault, Garbage, Mute
 from drivers.link import Link
-from drivers.messages import Flags, Twist
+from drivers.messages import Flags, LinkCounts, Twist
 from drivers.registry import make_driver
 from drivers.serial_port import LinkError
-from runtime.cycle.connection import ANSWER_TIMEOUT_S, CONNECT_MAX_S, POLL_S, Connection
+from drivers.tcp_port import explain_hang_up
+from runtime.cycle.connection import ANSWER_TIMEOUT_S, CONNECT_MAX_S, POLL_S, Connection, why_ended
 from runtime.cycle.process import Observers, RobotProcess
 from tests.runtime.virtual_time import STEP_S, MemoryLink, in_virtual_time
 
@@ -104,6 +106,13 @@ async def test_another_programs_port_that_answers_and_hangs_up_is_no_cable(sent:
         await writer.drain()
         writer.close()
 
+    assert said in await refused_over_tcp(answer)
+
+
+async def refused_over_tcp(
+    answer: Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]],
+) -> str:
+    """Connect to a server; return the error that this ends with."""
     server = await asyncio.start_server(answer, "127.0.0.1", 0)
     port = f"socket://127.0.0.1:{server.sockets[0].getsockname()[1]}"
     settings = load_settings("hallway", [f"link.port={port}"])
@@ -122,8 +131,39 @@ async def test_another_programs_port_that_answers_and_hangs_up_is_no_cable(sent:
     with pytest.raises(UserError) as refused:
         await Connection(link, driver, send, lambda: next(now_s), settings.body).connect(lambda: False)
     server.close()
-    assert said in str(refused.value)
     assert refused.value.exit_code == FAILED
+    return str(refused.value)
+
+
+async def test_a_program_error_on_a_network_line_is_not_taken_for_another_programs_port(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def answer(_reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(bytes(9))
+
+    def fail(*_: object) -> None:
+        raise KeyError("planted")
+
+    monkeypatch.setattr("drivers.denning.driver.DenningDriver.receive", fail)
+    text = await refused_over_tcp(answer)
+    assert "the handler of received data failed with KeyError: 'planted'" in text
+
+
+@pytest.mark.parametrize(
+    ("port", "has_hung_up", "frames", "is_stranger"),
+    [
+        ("socket://robot:1", True, 0, True),
+        ("socket://robot:1", True, 1, False),  # the robot has answered
+        ("socket://robot:1", False, 0, False),  # its system confirms nothing
+        ("/dev/ttyUSB0", True, 0, False),
+    ],
+)
+def test_only_a_connection_that_its_other_end_ends_before_any_frame_may_be_another_programs(
+    port: str, has_hung_up: bool, frames: int, is_stranger: bool
+) -> None:
+    link: Any = SimpleNamespace(last_error="lost", has_hung_up=has_hung_up, config=SimpleNamespace(port=port))
+    driver: Any = SimpleNamespace(counts=LinkCounts(frames, 0, 0))
+    assert why_ended(link, driver) == (explain_hang_up(port) if is_stranger else "lost")
 
 
 async def test_a_port_that_is_missing_is_refused_as_its_opening_would_be(tmp_path: Path) -> None:

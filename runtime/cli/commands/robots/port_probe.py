@@ -19,8 +19,7 @@ from drivers.heard_bytes import HeardBytes
 from drivers.link import Link, LinkError
 from drivers.messages import Flags, Identity
 from drivers.registry import line_options, make_driver, other_robot
-from drivers.tcp_port import explain_hang_up, is_tcp
-from runtime.cycle.connection import POLL_S, Connection
+from runtime.cycle.connection import POLL_S, Connection, why_ended
 
 ANSWER_MAX_S: Final = 3.0
 """Longest wait for a robot's first frame, s: to call a Pioneer at every speed of its line takes as long, and so does
@@ -180,8 +179,7 @@ async def _try(line: _Line, config: RobotConfig, answer_max_s: float) -> _Answer
             await asyncio.sleep(POLL_S)
         if listener.is_ready:
             return listener.look(clock())
-        ended = link.last_error and (explain_hang_up(line.port) if is_tcp(line.port) else link.last_error)
-        return _Answer(has_answered=False, problem=heard.stranger or ended)
+        return _Answer(has_answered=False, problem=heard.stranger or why_ended(link, driver))
     finally:
         if driver.state is LineState.READY:
             await Connection(link, driver, line.send, clock, config.body).shut_down()
