@@ -249,18 +249,23 @@ def assume_rays(s: Records[State], p: Records[Settings], rays: int) -> None:
 
 
 @kernel
+def edge_nat_of(tracks: Records[CircleTrack], but: int) -> float:
+    """Return the log odds that beams' edges answer here, by what is usual and what the circles, but for one, say."""
+    nat = EDGE_PRIOR_NAT
+    for t in range(len(tracks)):
+        if t != but and tracks[t].status == ESTABLISHED:
+            nat += min(EDGE_LEAD_MAX_NAT, max(-EDGE_LEAD_MAX_NAT, tracks[t].edge_lead))
+    return nat
+
+
+@kernel
 def hear_edges(s: Records[State], tracks: Records[CircleTrack], but: int) -> None:
     """Let beams' edges answer in the scratch from now on, by what the circles, but for one, say for it.
 
     Not where a circle is tried: by three rays the beam's edges are two of them, and only what fails is tried by rays.
     """
-    nat = 0.0
-    for t in range(len(tracks)):
-        if t != but and tracks[t].status == ESTABLISHED:
-            nat += min(EDGE_LEAD_MAX_NAT, max(-EDGE_LEAD_MAX_NAT, tracks[t].edge_lead))
-    s[0].edge_nat = nat
-    scratch = s[0].scratch
-    scratch.predicted.edge_nat = scratch.own.edge_nat = scratch.line_fit.edge_nat = EDGE_PRIOR_NAT + nat
+    scratch, nat = s[0].scratch, edge_nat_of(tracks, but)
+    scratch.predicted.edge_nat = scratch.own.edge_nat = scratch.line_fit.edge_nat = nat
 
 
 @kernel

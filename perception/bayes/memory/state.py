@@ -279,8 +279,6 @@ class State(Record):
     """Evidence of all objects' residuals for each noise."""
     rays: Annotated[int, up_to(RAYS_MAX)]
     """By how many rays bodies are heard here, 0: by their nearest points; see `inference.beam`."""
-    edge_nat: Finite
-    """What the circles, but for the one refined last, say for answers from beams' edges; see `inference.beam`."""
     tried_rays: Annotated[int, up_to(RAYS_MAX)]
     """By how many rays one that failed was tried last."""
     untried: Count

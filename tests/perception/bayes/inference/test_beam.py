@@ -110,9 +110,9 @@ def test_other_circles_say_whether_beams_edges_answer() -> None:
     scratch = memory.s[0].scratch
     assert scratch.predicted.edge_nat == beam.NO_EDGES_NAT
     beam.hear_edges(memory.s, memory.tracks, 3)
-    assert memory.s[0].edge_nat == 3.0 - beam.EDGE_LEAD_MAX_NAT
-    heard = (scratch.predicted, scratch.own, scratch.line_fit)
-    assert all(it.edge_nat == beam.EDGE_PRIOR_NAT + memory.s[0].edge_nat for it in heard)
+    nat = beam.EDGE_PRIOR_NAT + 3.0 - beam.EDGE_LEAD_MAX_NAT
+    assert beam.edge_nat_of(memory.tracks, 3) == nat
+    assert all(it.edge_nat == nat for it in (scratch.predicted, scratch.own, scratch.line_fit))
 
 
 @pytest.mark.parametrize(("lead", "prior"), [(0.0, -4.6), (-900.0, 2.0), (900.0, -30.0), (3.0, 0.0)])

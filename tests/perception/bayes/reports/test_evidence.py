@@ -34,6 +34,8 @@ from tests.perception.bayes.random_tracks import (
 
 EDGE_NAT = 2.5
 """What the place and the track say for answers from beams' edges, nat."""
+OTHER_NAT = 1.5
+"""What another circle says, nat."""
 
 
 @examples(15, 200)
@@ -42,7 +44,9 @@ def test_the_evidence_of_each_reading_for_a_circle_equals_its_oracle(examples: i
     for _ in range(examples):
         memory.circles.view(np.uint8)[...] = 0
         random_track(rng, memory, 0, ESTABLISHED)
-        memory.tracks[0].edge_lead = EDGE_NAT - EDGE_PRIOR_NAT
+        memory.tracks[0].edge_lead = EDGE_NAT - EDGE_PRIOR_NAT - OTHER_NAT
+        memory.tracks[2].status, memory.tracks[2].edge_lead = ESTABLISHED, OTHER_NAT
+        memory.tracks[2].x = 1e3
         place, rho = place_of(memory, 0), float(memory.circles["radius"][0])
         keep(memory, 0, around(rng, 40, place, rho))
         readings, nats = readings_of(np.zeros((COMPARED_MAX, 5))), np.zeros(COMPARED_MAX)
