@@ -14,7 +14,7 @@ from typing import Final
 
 from cyclopts import App, CycloptsError, Group
 
-from config.errors import DONE, WRONG_CALL, UserError
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.files import noting_files_read, one_line
 from runtime.cli.first_signals import EXIT_CODE_BASE
 from runtime.cli.standard_streams import ReaderGoneError
@@ -120,16 +120,22 @@ for flag in ("--help", "--version", "--install-completion"):
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit: 0 done, 1 the work failed, 2 the call or the configuration was wrong."""
+    """Run the command line and exit: 0 done, 1 the work failed, 2 the call or the configuration was wrong.
+
+    An error of the program is printed as the interpreter would, which may not end while a thread compiles a kernel.
+    """
     try:
         with ending_in_order():
             code = run_command(sys.argv[1:] if arguments is None else arguments)
     except ReaderGoneError:
         code = DONE
     except SystemExit as ended:
-        if not isinstance(ended.code, int):
-            raise
-        code = ended.code
+        code = ended.code if isinstance(ended.code, int) else DONE if ended.code is None else FAILED
+        if isinstance(ended.code, str):
+            sys.stderr.write(f"{ended.code}\n")
+    except Exception as error:  # noqa: BLE001 - whatever it is
+        sys.excepthook(type(error), error, error.__traceback__)
+        code = FAILED
     from runtime.support.daemon_thread import exit_process
 
     exit_process(code)

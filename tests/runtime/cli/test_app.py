@@ -9,7 +9,7 @@ from typing import Literal
 
 import pytest
 
-from config.errors import DONE, WRONG_CALL
+from config.errors import DONE, FAILED, WRONG_CALL
 from runtime.cli.app import COMMANDS, app, main, print_error, run_command
 from runtime.support.build import describe_build
 from tests.runtime.cli.user_errors import error_lines
@@ -98,6 +98,32 @@ def test_main_exits_with_the_code(capsys: pytest.CaptureFixture[str]) -> None:
         main(["frobnicate"])
     assert caught.value.code == WRONG_CALL
     assert len(error_lines(capsys.readouterr().err)) == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (KeyError("planted"), FAILED, "KeyError: 'planted'"),
+        (SystemExit("no such kernel"), FAILED, "no such kernel"),
+        (SystemExit(), DONE, ""),
+        (SystemExit(7), 7, ""),
+    ],
+    ids=repr,
+)
+def test_whatever_ends_a_command_no_library_is_taken_from_under_a_thread_that_works(
+    error: BaseException, code: int, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The interpreter's own end crashes where a kernel is compiled: `exit_process` ends each command."""
+
+    def fail(*_arguments: object, **_options: object) -> int:
+        raise error
+
+    ended: list[int] = []
+    monkeypatch.setattr("config.load.load_any", fail)
+    monkeypatch.setattr("runtime.support.daemon_thread.exit_process", ended.append)
+    main(["check", "hallway"])
+    assert ended == [code]
+    assert capsys.readouterr().err.strip().endswith(said)
 
 
 def test_an_interrupt_has_its_exit_code_and_no_traceback(
