@@ -111,41 +111,11 @@ def look(w: Array, place: Array) -> Look:
     return Look(d, (u * w[:, 2:4]).sum(1), u)
 
 
-def either_way(lead: float, prior: float = 0.0) -> float:
-    """Return the log of the mean of both ways of answering, by the lead of the edge and its log odds before."""
-    return float(np.logaddexp(0.0, lead + prior) - np.logaddexp(0.0, prior))
-
-
-def edge_lead_of_circle(
-    w: Array, seen: Look, rho: float, cosines: tuple[float, float, float], gate: float, miss: float, short: float,
-    noise: Noise,
-) -> float:  # fmt: skip
-    """Return the lead of what the beams' edges meet of a circle whose centre is past them."""
-    opt, half, inside = (math.acos(cosine) for cosine in cosines)
-    lead = 0.0
-    for j in range(len(w)):
-        d, off = seen.d[j], math.acos(min(1.0, max(-1.0, seen.cos[j])))
-        past = off - half
-        gap = half + past - math.asin(min(1.0, rho / d))
-        if past <= 0.0 or gap > opt:
-            continue
-        r = d * math.cos(past) - math.sqrt(max(0.0, rho**2 - (d * math.sin(past)) ** 2))
-        for sign, e, angle in ((1.0, w[j, 4] - r, gap), (-1.0, w[j, 4] - d + rho, off)):
-            v = 0.0
-            if abs(e) >= gate and angle <= inside:
-                v = miss if e > 0.0 else short
-            elif abs(e) < gate and angle <= opt:
-                v = float(evidence(noise, w[j : j + 1, 4], np.array([e]))[0])
-                v = max(v, 0.0) if angle > half else v
-            lead += sign * v
-    return lead
-
-
 def score_circle(
     w: Array, centre: Array, rho: float, cosines: tuple[float, float, float], gate: float, miss: float, short: float,
-    noise: Noise, prior: float = 0.0,
+    noise: Noise,
 ) -> dict[str, float]:  # fmt: skip
-    """Return the evidence of readings for a circle, and its counts; `prior` is of `either_way`."""
+    """Return the evidence of readings for a circle, and its counts."""
     opt, half, inside = cosines
     seen = look(w, centre)
     e = w[:, 4] - (seen.d - rho)
@@ -159,42 +129,12 @@ def score_circle(
     shorts = int(((e < -gate) & (seen.cos >= inside)).sum())
     extra = throughs - 0.2 * (hit.sum() + throughs)
     llr = v.sum() + throughs * miss + shorts * short - 2.0 * max(0.0, extra - 1.0)
-    llr += either_way(edge_lead_of_circle(w, seen, rho, cosines, gate, miss, short, noise), prior)
     axes = w[hit, 2:4].sum(0)
     return {
         "llr": float(llr), "hits": float(hit.sum()), "throughs": throughs, "near": float(near.sum()),
         "closest": float(w[hit, 4].min(initial=1e9)),
         "dispersion": 1.0 - float(np.hypot(*axes)) / max(1.0, float(hit.sum())),
     }  # fmt: skip
-
-
-def edge_lead_of_line(
-    w: Array, normal: Array, origin: Array, c: float, cosines: tuple[float, float, float], gate: float, miss: float,
-    noise: Noise, extent: tuple[float, float],
-) -> float:  # fmt: skip
-    """Return the lead of what the beams' edges meet of a line whose foot is past them; 78° of incidence at most."""
-    opt, half, _ = (math.acos(cosine) for cosine in cosines)
-    own, lead = line_error(w, origin, normal, c), 0.0
-    for j in range(len(w)):
-        away, turn = (
-            w[j, 4] - own[j],
-            math.remainder(math.atan2(normal[1], normal[0]) - math.atan2(w[j, 3], w[j, 2]), math.tau),
-        )
-        if abs(turn) <= half or away <= 0.0:
-            continue
-        slant = (abs(turn) - half) * math.copysign(1.0, turn)  # the edge's direction is the normal's less this
-        along = math.cos(slant)
-        if along <= 0.2:
-            continue
-        e = w[j, 4] - away / along
-        foot = float((w[j, :2] - origin) @ np.array([-normal[1], normal[0]])) - away * math.sin(slant) / along
-        if abs(e) < gate:
-            lead += max(0.0, float(evidence(noise, w[j : j + 1, 4], np.array([e]))[0]))
-        elif e > 0.0 and extent[0] < foot < extent[1]:
-            lead += miss
-        if abs(turn) <= opt and abs(own[j]) < gate:
-            lead -= max(0.0, float(evidence(noise, w[j : j + 1, 4], own[j : j + 1])[0]))
-    return lead
 
 
 def weights(e: Array, var: Array, soft: float) -> Array:

@@ -12,8 +12,8 @@ from perception.detected_object import DetectedObject
 from perception.pipeline import Perception
 from tests.perception.halls import FT
 
-EARLY = 68
-"""Firings until the first drums are detected; another one is still unknown."""
+EARLY = 61
+"""Firings until the first drums are detected."""
 SEEN_TO_FT = 6.0
 """The first drive ends at this x, ft, with four drums detected."""
 DRUM = (1.0 * FT, 4.0 * FT)

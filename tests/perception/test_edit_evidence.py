@@ -125,7 +125,6 @@ def test_evidence_for_an_object_that_is_not_a_model(reached_drums: Perception) -
     circles, settings = method.memory.circles, method.settings[0]
     t = int(np.flatnonzero(circles["status"] == ESTABLISHED)[0])
     circles["kind"][t] = settings.model_count
-    circles["is_named"][t] = 0
     circles["radius"][t] = settings.circles[settings.model_count].radius_m
     number = int(circles["number"][t])
     evidence = seen.evidence(number)

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.inference.beam import edge_lead_of_line, either_way
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.inference.range_fit import Circle, fit_circle, fit_reading_line, score_circle, score_line
 from perception.bayes.memory.elements import Reading
@@ -160,8 +159,4 @@ def fit_other_line(
         scratch.line_fit,
     )
     score_line(readings, scratch.line_fit, cx, cy, p, s[0].noise_level, scratch.line_score)
-    llr = scratch.line_score.log_likelihood_ratio
-    if scratch.line_fit.rays > 0:
-        return llr
-    lead = edge_lead_of_line(readings, scratch.line_fit, cx, cy, p, s[0].noise_level, scratch.line_score)
-    return llr + either_way(lead, scratch.line_fit.edge_nat)
+    return scratch.line_score.log_likelihood_ratio

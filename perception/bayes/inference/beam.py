@@ -15,26 +15,14 @@ import math
 from typing import Final
 
 from perception.bayes.inference.cross_path import LENGTH_MIN_M, circle_error, is_crossed
-from perception.bayes.inference.likelihood import level_of, log_likelihood
 from perception.bayes.memory.elements import Reading
-from perception.bayes.memory.scratch import LineFit, LineScore, Predictions
 from perception.bayes.memory.settings_record import Settings
-from perception.bayes.memory.state import ESTABLISHED, RAYS_MAX, CircleTrack, State
+from perception.bayes.memory.state import RAYS_MAX, State
 from perception.kernel import kernel
 from perception.records import Records
 
 GRAZING_MIN: Final = 0.2
 """Least cosine of incidence by which a range is derived: beyond it the range's slope has no bound."""
-
-EDGE_PRIOR_NAT: Final = -4.6
-"""Log prior odds (a hundredth) that bodies past a beam answer from its edge as well. With a tenth, drums that are
-heard as mirrors are named .1 to .2 ft later."""
-NO_EDGES_NAT: Final = -1e9
-"""The same where they do not."""
-EDGE_LEAD_MAX_NAT: Final = 10.0
-"""Most that one circle says for or against it, so that no wrong one decides for all."""
-EDGES: Final = 2
-"""Rays that are the beam's two edges."""
 
 
 @kernel
@@ -101,107 +89,6 @@ def ray_over_circle(
 
 
 @kernel
-def log_one_plus_exp(v: float) -> float:
-    """Return log(1 + exp(v)) of any v."""
-    return max(v, 0.0) + math.log1p(math.exp(-abs(v)))
-
-
-@kernel
-def either_way(lead: float, prior_nat: float) -> float:
-    """Return the log ratio (nat) of both ways of answering to nearest points, by the edge's lead and log odds."""
-    return log_one_plus_exp(lead + prior_nat) - log_one_plus_exp(prior_nat)
-
-
-@kernel
-def evidence_of_reading(q: Reading, e: float, d: float, ahead: float, p: Records[Settings], noise: int) -> float:
-    """Return what a reading says of a circle, nat; see `range_fit.score_circle`.
-
-    Parameters
-    ----------
-    q, p, noise
-        As for `range_fit.score_circle`.
-    e, d, ahead : float
-        The reading's error, the centre's distance, and how far ahead it counts, m.
-    """
-    if abs(e) < p[0].gate_m:
-        if ahead < p[0].cos_may_answer * d:
-            return 0.0
-        v = log_likelihood(p, level_of(p, noise, q.range_m), e)
-        return max(v, 0.0) if ahead < p[0].cos_half_angle * d else v
-    if ahead < p[0].cos_must_answer * d:
-        return 0.0
-    return float(p[0].missed_echo_nat if e > 0.0 else p[0].short_echo_nat)
-
-
-@kernel
-def edge_lead_of_circle(
-    readings: Records[Reading], cx: float, cy: float, radius: float, p: Records[Settings], noise: int,
-    predicted: Predictions,
-) -> float:  # fmt: skip
-    """Return how much likelier (nat) readings are if a circle past a beam answers from where its edge meets it.
-
-    Parameters
-    ----------
-    readings, cx, cy, radius, p, noise
-        As for `range_fit.score_circle`.
-    predicted : Predictions
-        What the circle predicts.
-    """
-    lead = 0.0
-    for j in range(len(readings)):
-        q = readings[j]
-        d, ahead = predicted.distance[j], predicted.ahead[j]
-        if ahead >= p[0].cos_half_angle * d or is_crossed(q):
-            continue
-        r, _, _, by_edge = ray_over_circle(q, cx - q.x, cy - q.y, d, radius, p[0].half_angle_rad, EDGES)
-        if by_edge >= p[0].cos_may_answer * d:
-            lead += evidence_of_reading(q, q.range_m - r, d, by_edge, p, noise)
-            lead -= evidence_of_reading(q, predicted.error[j], d, ahead, p, noise)
-    return lead
-
-
-@kernel
-def edge_lead_of_line(
-    readings: Records[Reading],
-    line: LineFit,
-    ox: float,
-    oy: float,
-    p: Records[Settings],
-    noise: int,
-    extent: LineScore,
-) -> float:
-    """Return the same of a line whose foot is past a beam; silence counts only within its extent.
-
-    Parameters
-    ----------
-    readings, line, ox, oy, p, noise
-        As for `range_fit.score_line`.
-    extent : LineScore
-        Of its hits.
-    """
-    lead = 0.0
-    cos_half = p[0].cos_half_angle
-    grazing = GRAZING_MIN * cos_half - math.sqrt(1.0 - GRAZING_MIN**2) * p[0].sin_half_angle
-    for j in range(len(readings)):
-        q = readings[j]
-        ahead = line.normal_x * q.axis_x + line.normal_y * q.axis_y
-        away = line.distance - line.normal_x * (q.x - ox) - line.normal_y * (q.y - oy)
-        if ahead >= cos_half or ahead <= grazing or away <= 0.0 or is_crossed(q):
-            continue
-        r, slant = ray_over_line(q, line.normal_x, line.normal_y, away, p[0].half_angle_rad, EDGES)
-        e = q.range_m - r
-        at = line.normal_x * (q.y - oy) - line.normal_y * (q.x - ox) - away * slant
-        if abs(e) < p[0].gate_m:
-            lead += max(0.0, log_likelihood(p, level_of(p, noise, q.range_m), e))
-        elif e > 0.0 and extent.low < at < extent.high:
-            lead += p[0].missed_echo_nat
-        own = q.range_m - away
-        if ahead >= p[0].cos_may_answer and abs(own) < p[0].gate_m:
-            lead -= max(0.0, log_likelihood(p, level_of(p, noise, q.range_m), own))
-    return lead
-
-
-@kernel
 def answer(
     q: Reading, dx: float, dy: float, d: float, radius: float, half_angle: float, rays: int
 ) -> tuple[float, float]:
@@ -234,38 +121,17 @@ def ray_over_line(q: Reading, nx: float, ny: float, away: float, half_angle: flo
 
 @kernel
 def assume_rays(s: Records[State], p: Records[Settings], rays: int) -> None:
-    """Let what is predicted in the scratch from now on be heard by so many rays; 0: by the nearest point alone."""
+    """Let what is predicted in the scratch from now on be heard by so many rays; 0: by the nearest point."""
     scratch = s[0].scratch
     half_angle = p[0].half_angle_rad
     scratch.predicted.rays = scratch.own.rays = rays
     scratch.predicted.half_angle = scratch.own.half_angle = half_angle
-    scratch.predicted.edge_nat = scratch.own.edge_nat = scratch.line_fit.edge_nat = NO_EDGES_NAT
     scratch.line_fit.rays = rays
     scratch.line_fit.half_angle = half_angle
     for side in range(2):
         face = scratch.corner_fit.faces[side]
         face.rays = rays
         face.half_angle = half_angle
-
-
-@kernel
-def edge_nat_of(tracks: Records[CircleTrack], but: int) -> float:
-    """Return the log odds that beams' edges answer here, by what is usual and what the circles, but for one, say."""
-    nat = EDGE_PRIOR_NAT
-    for t in range(len(tracks)):
-        if t != but and tracks[t].status == ESTABLISHED:
-            nat += min(EDGE_LEAD_MAX_NAT, max(-EDGE_LEAD_MAX_NAT, tracks[t].edge_lead))
-    return nat
-
-
-@kernel
-def hear_edges(s: Records[State], tracks: Records[CircleTrack], but: int) -> None:
-    """Let beams' edges answer in the scratch from now on, by what the circles, but for one, say for it.
-
-    Not where a circle is tried: by three rays the beam's edges are two of them, and only what fails is tried by rays.
-    """
-    scratch, nat = s[0].scratch, edge_nat_of(tracks, but)
-    scratch.predicted.edge_nat = scratch.own.edge_nat = scratch.line_fit.edge_nat = nat
 
 
 @kernel

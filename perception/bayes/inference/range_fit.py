@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Final, TypeAlias
 
-from perception.bayes.inference.beam import GRAZING_MIN, edge_lead_of_circle, either_way, ray_over_line
+from perception.bayes.inference.beam import GRAZING_MIN, ray_over_line
 from perception.bayes.inference.cross_path import is_crossed, over_line
 from perception.bayes.inference.likelihood import level_of, log_likelihood
 from perception.bayes.inference.prediction import predict_circle
@@ -132,10 +132,6 @@ def score_circle(
     extra = misses - DROP_OUT_SHARE * (hits + misses)
     if extra > 1.0:
         llr -= DROP_OUT_NAT * (extra - 1.0)
-    score.edge_lead = 0.0
-    if predicted.rays == 0:
-        score.edge_lead = edge_lead_of_circle(readings, cx, cy, radius, p, noise, predicted)
-        llr += either_way(score.edge_lead, predicted.edge_nat)
     score.log_likelihood_ratio = llr
     score.hits = hits
     score.misses = misses

@@ -71,8 +71,6 @@ class Predictions(Record):
     """By how many rays the circle is heard, 0 by its nearest point. Given, not computed."""
     half_angle: float
     """Half the beam's opening, rad; given where there are rays."""
-    edge_nat: float
-    """Log odds that bodies past a beam answer from its edge; given."""
     error: Annotated[Floats, COMPARED_MAX]
     """Range, or half a cross path, less the predicted one, m."""
     slope_x: Annotated[Floats, COMPARED_MAX]
@@ -129,8 +127,6 @@ class Score(Record):
     """Dispersion of the axes of the sensors that heard it."""
     sure_hits: float
     """Hits where an echo was certain to be heard; of a polygon only."""
-    edge_lead: float
-    """As in `CircleTrack`; of a circle only."""
 
 
 class LineScore(Record):
@@ -164,7 +160,6 @@ class LineFit(Record):
     rays: int
     """As in `Predictions`; given."""
     half_angle: float
-    edge_nat: float
 
 
 class CornerFit(Record):

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from perception.bayes.inference.beam import answer, edge_nat_of
+from perception.bayes.inference.beam import answer
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.inference.occlusion import find_others, is_relevant
 from perception.bayes.inference.range_fit import FAR, score_circle
@@ -63,7 +63,6 @@ def circle_evidence(
     known = others[: find_others(tracks, t, p, track.x, track.y, track.radius, s[0].rays, others)]
     predicted[0].rays = s[0].rays
     predicted[0].half_angle = p[0].half_angle_rad
-    predicted[0].edge_nat = edge_nat_of(tracks, t) + track.edge_lead  # as all its readings say together
     for j in range(n):
         nats[j] = 0.0
         q = readings[j]

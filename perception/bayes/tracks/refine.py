@@ -15,7 +15,7 @@ from perception.bayes.circles.heard_rays import compare_rays, decide_rays
 from perception.bayes.circles.lateral_search import search_across
 from perception.bayes.circles.outline_check import other_bodies, outline_lead, round_lead
 from perception.bayes.circles.posterior import posterior_circle
-from perception.bayes.inference.beam import assume_rays, hear_edges
+from perception.bayes.inference.beam import assume_rays
 from perception.bayes.inference.likelihood import bounded_exp
 from perception.bayes.inference.lines import enter_line, is_in_wall
 from perception.bayes.inference.noise_estimation import add_residuals, noise_variance
@@ -174,7 +174,6 @@ def update_score(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
     track.near = said.near
     track.unknown_nat = p[0].unknown_nat * said.near
     track.dispersion = said.dispersion
-    track.edge_lead = said.edge_lead
     track.leads[track.kind] = 0.0
     beyond: float = max(0.0, said.closest - p[0].far_m)
     return p[0].model_prior_nat - p[0].far_nat_per_m * beyond
@@ -204,7 +203,6 @@ def change_kind(s: StateRecord, p: SettingsRecord, track: CircleTrack, k: int, e
     track.leads[k] = 0.0
     track.outline_lead = 0.0
     track.round_lead = 0.0
-    track.edge_lead = 0.0
     track.log_likelihood_ratio = evidence_nat
     track.refinements = 0
     track.unseen += SWITCH_UNSEEN
@@ -310,7 +308,6 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     n = copy_reservoir(track, s[0].scratch.readings)
     n = add_crosses(s, p, track.x, track.y, track.radius, s[0].scratch.readings, n)
     assume_rays(s, p, s[0].rays)
-    hear_edges(s, tracks, t)
     n = keep_relevant(s, tracks, p, n, track.x, track.y, track.radius, t)
     track.reservoir = n
     track.unseen = 0

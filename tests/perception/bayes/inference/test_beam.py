@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perception.bayes.inference import beam
-from perception.bayes.memory.state import ESTABLISHED, RAYS_MAX, TENTATIVE, Memory
+from perception.bayes.memory.state import RAYS_MAX, Memory
 from tests.perception.bayes.random_tracks import SENSORS, P, examples, pair, readings_of
 
 
@@ -98,24 +98,3 @@ def test_the_scratch_is_heard_as_assumed() -> None:
     scratch = memory.s[0].scratch
     heard = (scratch.predicted, scratch.own, scratch.line_fit, *scratch.corner_fit.faces)
     assert all(it.rays == 3 and it.half_angle == P[0].half_angle_rad for it in heard)
-
-
-def test_other_circles_say_whether_beams_edges_answer() -> None:
-    memory = Memory(SENSORS, 4)
-    for t, (status, lead) in enumerate(
-        [(ESTABLISHED, 3.0), (ESTABLISHED, -40.0), (TENTATIVE, 5.0), (ESTABLISHED, 2.0)]
-    ):
-        memory.tracks[t].status, memory.tracks[t].edge_lead = status, lead
-    beam.assume_rays(memory.s, P, 0)
-    scratch = memory.s[0].scratch
-    assert scratch.predicted.edge_nat == beam.NO_EDGES_NAT
-    beam.hear_edges(memory.s, memory.tracks, 3)
-    nat = beam.EDGE_PRIOR_NAT + 3.0 - beam.EDGE_LEAD_MAX_NAT
-    assert beam.edge_nat_of(memory.tracks, 3) == nat
-    assert all(it.edge_nat == nat for it in (scratch.predicted, scratch.own, scratch.line_fit))
-
-
-@pytest.mark.parametrize(("lead", "prior"), [(0.0, -4.6), (-900.0, 2.0), (900.0, -30.0), (3.0, 0.0)])
-def test_both_ways_of_answering_are_mixed(lead: float, prior: float) -> None:
-    want = np.logaddexp(0.0, lead + prior) - np.logaddexp(0.0, prior)
-    assert beam.either_way(lead, prior) == pytest.approx(want, abs=1e-12)

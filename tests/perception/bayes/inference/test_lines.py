@@ -94,7 +94,7 @@ def test_a_new_line_is_known_or_replaces_the_least_credible(examples: int) -> No
             new.normal, new.origin = unit(turned), like.origin + rng.normal(0, 0.1, 2)
             new.c = like.c + rng.normal(0, 0.1)
         before = line_rows(memory).copy()
-        fit[0] = (*new.normal, new.c, 0, 0.0, 0.0)
+        fit[0] = (*new.normal, new.c, 0, 0.0)
         score[0] = (0.0, new.echoes, 0.0, new.low, new.high)
         walls.enter_line(memory.s, records(LineFit, fit)[0], *pair(new.origin), records(LineScore, score)[0])
         if any(naive_tracks.same_line(line, new) for line in lines.values()):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,6 @@ from perception.bayes.memory.scratch import CircleFit, LineFit, LineScore, Score
 from perception.kernel import Floats
 from perception.records import Records
 from tests import naive_bayes
-from tests.perception.bayes.random_tracks import P as SHIPPED
 from tests.perception.bayes.random_tracks import examples, pair, predictions, readings_of
 from tests.perception.bayes.range_cases import COSINES, GATE, MISS, OPT, SHORT, Case, cases, one
 
@@ -86,37 +83,3 @@ def test_without_an_echo_a_fit_does_not_move_and_the_score_has_no_hits() -> None
     fields = score_circle(case._replace(rho=0.3), readings_of(silent), 0.2, 0.3)
     assert fields[1] == 0
     assert fields[0] <= 0
-
-
-def echoes_of_a_drum(to: np.ndarray, radius: float, half_angle: float) -> np.ndarray:
-    """Return what a ring of 24 beams hears of a drum that it comes nearer to, each beam by its nearest point in it.
-
-    Place x, y, axis x, y and range rounded to .1 ft, of what hears it; shape (n, 5).
-    """
-    rows = []
-    for x in np.arange(-1.0, -0.25, 0.1):
-        towards, d = math.atan2(to[1], to[0] - x), math.hypot(to[0] - x, to[1])
-        for axis in 0.13 + 2.0 * np.pi * np.arange(24) / 24:
-            past = max(abs(math.remainder(towards - axis, math.tau)) - half_angle, 0.0)
-            if past < math.asin(radius / d):
-                r = d * math.cos(past) - math.sqrt(radius**2 - (d * math.sin(past)) ** 2)
-                rows.append((x, 0.0, math.cos(axis), math.sin(axis), 0.03048 * round(r / 0.03048)))
-    return np.array(rows)
-
-
-def test_a_drum_that_answers_at_beams_edges_is_no_barrel_farther_behind() -> None:
-    """Whose centre lies in more of the beams: heard by the nearest point of the whole body it leads by 11 nat."""
-    case = next(cases(1, 7))._replace(p=SHIPPED, level=0)
-    drum, radius, barrel_radius = np.array([0.0, 0.8]), 0.3048, 0.67056
-    rows = echoes_of_a_drum(drum, radius, float(SHIPPED[0].half_angle_rad))
-    readings, (fit, barrel) = readings_of(rows), one(CircleFit)
-    to = naive_bayes.look(rows, drum).u.sum(0)
-    behind = pair(drum + (barrel_radius - radius) * to / np.hypot(*to))
-    assert range_fit.fit_circle(
-        readings, (*behind, barrel_radius), SHIPPED, 9.0, (8e-5, 0.0), 6, predictions(), fit[0]
-    )
-    by_drum = score_circle(case._replace(rho=radius), readings, *pair(drum))
-    by_barrel = score_circle(case._replace(rho=barrel_radius), readings, *pair(barrel[:2]))
-    by_mirror = [fields[0] - naive_bayes.either_way(fields[-1]) for fields in (by_drum, by_barrel)]
-    assert by_mirror[1] > by_mirror[0] + 8.0
-    assert by_drum[0] > by_barrel[0] + 40.0

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.inference.beam import EDGE_PRIOR_NAT
 from perception.bayes.inference.likelihood import level_of, log_likelihood
 from perception.bayes.memory.elements import COMPARED_MAX
 from perception.bayes.memory.scratch import OtherCircle, Predictions, Score
@@ -32,11 +31,6 @@ from tests.perception.bayes.random_tracks import (
     readings_of,
 )
 
-EDGE_NAT = 2.5
-"""What the place and the track say for answers from beams' edges, nat."""
-OTHER_NAT = 1.5
-"""What another circle says, nat."""
-
 
 @examples(15, 200)
 def test_the_evidence_of_each_reading_for_a_circle_equals_its_oracle(examples: int) -> None:
@@ -44,9 +38,6 @@ def test_the_evidence_of_each_reading_for_a_circle_equals_its_oracle(examples: i
     for _ in range(examples):
         memory.circles.view(np.uint8)[...] = 0
         random_track(rng, memory, 0, ESTABLISHED)
-        memory.tracks[0].edge_lead = EDGE_NAT - EDGE_PRIOR_NAT - OTHER_NAT
-        memory.tracks[2].status, memory.tracks[2].edge_lead = ESTABLISHED, OTHER_NAT
-        memory.tracks[2].x = 1e3
         place, rho = place_of(memory, 0), float(memory.circles["radius"][0])
         keep(memory, 0, around(rng, 40, place, rho))
         readings, nats = readings_of(np.zeros((COMPARED_MAX, 5))), np.zeros(COMPARED_MAX)
@@ -57,7 +48,7 @@ def test_the_evidence_of_each_reading_for_a_circle_equals_its_oracle(examples: i
         noise = noises()[int(memory.s[0].noise_level)]
         want = [
             naive_bayes.score_circle(
-                w[j : j + 1], place, rho, COSINES, S.gate_m, S.missed_echo_nat, S.short_echo_nat, noise, EDGE_NAT
+                w[j : j + 1], place, rho, COSINES, S.gate_m, S.missed_echo_nat, S.short_echo_nat, noise
             )["llr"]
             for j in range(40)
         ]  # fmt: skip
