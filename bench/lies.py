@@ -196,6 +196,7 @@ def run_trial(
     state = fresh_state(settings, recognises=recognises)
     budget, cycle = QuantumBudget(QUANTA_PER_CYCLE), 0
     until_s = begin_s + (HONEST_S if kind is None else LIE_S)
+    names = frozenset[str]() if kind is None else HELD | {DOUBTED} if kind.startswith("turned") else HELD
     run_s = before_m_s = speed_m_s = contact_m_s = way_m = 0.0
     place = device.truth.pose
     contact_s = named_s = said = held = None
@@ -228,8 +229,7 @@ def run_trial(
             if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and not str(state.mode.reason).startswith(BUMPER):
                 texts.append(str(state.mode.reason))
             held = held if state.hold_reason == held else None
-            names = HELD if kind is None or not kind.startswith("turned") else {*HELD, DOUBTED}
-            if kind is not None and held is None and state.hold_reason in names:
+            if held is None and state.hold_reason in names:
                 texts.append(str(state.hold_reason))
             if texts:
                 named_s, said = run_s - begin_s, texts[-1]

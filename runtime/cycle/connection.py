@@ -77,8 +77,8 @@ class Connection(NamedTuple):
         """Return why the line that was opened is closed; None while it is open."""
         if self.link.is_open or self.link.last_error is None:
             return None
-        heard = getattr(self.driver, "heard", None)
-        return (heard.stranger if isinstance(heard, HeardBytes) else None) or why_ended(self.link, self.driver)
+        heard = getattr(self.driver, "heard", None)  # not of each driver
+        return why_ended(self.link, self.driver, heard if isinstance(heard, HeardBytes) else None)
 
     def refuse_missing(self) -> None:
         """Raise what `connect` would raise if there is no such port; nothing is opened.
@@ -128,11 +128,14 @@ class Connection(NamedTuple):
         return False
 
 
-def why_ended(link: Link, driver: RobotDriver) -> str | None:
+def why_ended(link: Link, driver: RobotDriver, heard: HeardBytes | None) -> str | None:
     """Return why a line that was opened is closed; None if it was not lost.
 
-    A connection that its other end ends before any frame came may be to another program; any other loss is a loss.
+    What was heard, if it is known, may show what is at the other end. A connection that its other end ends before any
+    frame came may be to another program; any other loss is a loss.
     """
+    if heard is not None and heard.stranger is not None:
+        return heard.stranger
     port = link.config.port
     if (
         link.last_error is None

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from drivers.messages import wrap_angle
 from perception.kernel import Floats
+from perception.localization.submaps.line_pairs import moved_lines, with_lines
 from perception.localization.submaps.local_grid import (
     SUBMAP_CELLS,
     add_map,
     answers_of,
     make_grid,
 )
-from perception.localization.submaps.map_lines import find_lines, moved_lines, with_lines
+from perception.localization.submaps.map_lines import find_lines
 from perception.localization.submaps.map_match import Match, best_match
 from perception.localization.submaps.pose_graph import (
     GRAPH_SCALE_SIGMAS,
@@ -80,7 +81,7 @@ class Maps(NamedTuple):
     grids: dict[int, Floats]
     """Hits and passes of maps by number, shape (2, SUBMAP_CELLS, SUBMAP_CELLS) each, the last used at the end."""
     lines: dict[int, Floats]
-    """Lines of maps by number, as of `map_lines.find_lines`. Updated."""
+    """Lines of maps by number, as of `map_lines.find_lines`, the last used at the end."""
 
 
 class Outcome(NamedTuple):
@@ -117,7 +118,7 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
         joined = np.zeros((2, SUBMAP_CELLS, SUBMAP_CELLS))
         for member in run:
             x, y, theta = between(pose_of(nodes[nearest]), pose_of(nodes[member])).tolist()
-            hits, passes = _grid_of(maps, member, half_angle)
+            hits, passes = _kept(maps.grids, maps, member, make_grid, half_angle)
             add_map(hits, passes, x, y, theta, joined[0], joined[1])
             yield None
         answers = np.empty((2, SUBMAP_CELLS, SUBMAP_CELLS))
@@ -139,9 +140,9 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
         if match is None:
             continue
         log_likelihood = match.log_likelihood + match.known * beam[1]
-        if number - 1 in run:
-            usual += log_likelihood, match.known
         is_next = number - 1 in run
+        if is_next:
+            usual += log_likelihood, match.known
         pose, by_lost = unlost(match.pose, is_next=is_next)
         off = pose - expected
         off[2] = wrap_angle(off[2])
@@ -154,7 +155,8 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
         if is_next:  # loops find walls from both sides, and as they were bent by the drift between
             before = []
             for member in run:
-                before.append(_lines_of(maps, member, nearest, half_angle))
+                lines = _kept(maps.lines, maps, member, find_lines, half_angle)
+                before.append(moved_lines(lines, between(pose_of(nodes[nearest]), pose_of(nodes[member]))))
                 yield None
             of_cells = information
             pose, information = with_lines(np.concatenate(before), maps.lines[number], pose, of_cells)
@@ -172,24 +174,20 @@ def _firm(information: Floats) -> Floats:
     return np.asarray((axes * (values * values / (values + FREE_INFORMATION))) @ axes.T, dtype=np.float64)
 
 
-def _grid_of(maps: Maps, number: int, half_angle: float) -> Floats:
-    """Return hits and passes of a map before; made again at once if they are no longer kept."""
-    grid = maps.grids.pop(number, None)
-    if grid is None:
+def _kept(
+    cache: dict[int, Floats],
+    maps: Maps,
+    number: int,
+    make: Callable[[Floats, float], Iterator[Floats]],
+    half_angle: float,
+) -> Floats:
+    """Return what was made of the readings of a map before; made again at once if it is no longer kept."""
+    kept = cache.pop(number, None)
+    if kept is None:
         submap = maps.submaps[number]
-        *_, grid = make_grid(np.ascontiguousarray(submap["readings"][: submap["count"]]), half_angle)
-    maps.grids[number] = grid
-    return grid
-
-
-def _lines_of(maps: Maps, number: int, nearest: int, half_angle: float) -> Floats:
-    """Return the lines of a map before in the frame of another one; found again at once if they are not kept."""
-    lines = maps.lines.get(number)
-    if lines is None:
-        submap = maps.submaps[number]
-        *_, lines = find_lines(np.ascontiguousarray(submap["readings"][: submap["count"]]), half_angle)
-        maps.lines[number] = lines
-    return moved_lines(lines, between(pose_of(maps.nodes[nearest]), pose_of(maps.nodes[number])))
+        *_, kept = make(np.ascontiguousarray(submap["readings"][: submap["count"]]), half_angle)
+    cache[number] = kept
+    return kept
 
 
 def _runs(numbers: Sequence[int]) -> list[list[int]]:

@@ -248,10 +248,9 @@ class SubmapGraph:
         self.is_applied = self.is_applied or outcome.gain > REFUTED + REFUTED_A_NUMBER * numbers
         self._matched += 1
         self._quanta, self._job = 0, None
-        for number in list(self._grids)[:-GRIDS_MAX]:
-            del self._grids[number]
-        for number in [one for one in self._lines if one < self._matched - RUN_MAX]:
-            del self._lines[number]
+        for cache, count in ((self._grids, GRIDS_MAX), (self._lines, RUN_MAX + 1)):
+            for number in list(cache)[:-count]:
+                del cache[number]
         self._spread[:] = spread_about(0, self._links.archived_rows, self._nodes.archived_rows)[-1]
 
     @property

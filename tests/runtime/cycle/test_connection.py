@@ -163,7 +163,7 @@ def test_only_a_connection_that_its_other_end_ends_before_any_frame_may_be_anoth
 ) -> None:
     link: Any = SimpleNamespace(last_error="lost", has_hung_up=has_hung_up, config=SimpleNamespace(port=port))
     driver: Any = SimpleNamespace(counts=LinkCounts(frames, 0, 0))
-    assert why_ended(link, driver) == (explain_hang_up(port) if is_stranger else "lost")
+    assert why_ended(link, driver, None) == (explain_hang_up(port) if is_stranger else "lost")
 
 
 async def test_a_port_that_is_missing_is_refused_as_its_opening_would_be(tmp_path: Path) -> None:

@@ -179,7 +179,7 @@ async def _try(line: _Line, config: RobotConfig, answer_max_s: float) -> _Answer
             await asyncio.sleep(POLL_S)
         if listener.is_ready:
             return listener.look(clock())
-        return _Answer(has_answered=False, problem=heard.stranger or why_ended(link, driver))
+        return _Answer(has_answered=False, problem=why_ended(link, driver, heard))
     finally:
         if driver.state is LineState.READY:
             await Connection(link, driver, line.send, clock, config.body).shut_down()

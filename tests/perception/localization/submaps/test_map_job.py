@@ -8,6 +8,7 @@ import pytest
 from perception.localization.submaps import map_job
 from perception.localization.submaps.local_grid import SUBMAP_CELLS, make_grid
 from perception.localization.submaps.map_job import Maps, Outcome, match_map
+from perception.localization.submaps.map_lines import find_lines
 from perception.localization.submaps.pose_graph import SCALES, Link
 from perception.localization.submaps.submap_records import (
     Submap,
@@ -55,6 +56,7 @@ def test_a_map_is_matched_with_the_one_before() -> None:
 def test_caches_change_nothing() -> None:
     cold, warm = two_maps(), two_maps()
     *_, warm.grids[0] = make_grid(np.array(room_readings()), BEAM)
+    *_, warm.lines[0] = find_lines(np.array(room_readings()), BEAM)
     *mine, one = match_map(cold, BEAM)
     *its, other = match_map(warm, BEAM)
     assert len(mine) == len(its)
@@ -62,6 +64,7 @@ def test_caches_change_nothing() -> None:
     assert isinstance(other, Outcome)
     assert one.nodes.tolist() == other.nodes.tolist()
     assert cold.grids[0].shape == (2, SUBMAP_CELLS, SUBMAP_CELLS)
+    assert cold.lines[0].tolist() == warm.lines[0].tolist()
 
 
 def test_the_first_map_has_nothing_to_be_compared_with() -> None:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from threading import Event, Thread
 from typing import Final
 
 import numpy as np
@@ -20,7 +18,7 @@ from config.robot import SensorConfig
 from drivers.firing_pattern import firing_pattern
 from drivers.messages import Firing, Floats, Pose
 from runtime.recording.conventions.options import AUTO, RingLogOptions
-from runtime.recording.conventions.reading import FIRST_OF_PIPE, _checked, converted_firings, open_ring_log
+from runtime.recording.conventions.reading import _checked, converted_firings, open_ring_log
 from runtime.recording.ring_log import RingLogError, read_ring_log
 from runtime.recording.ring_log_replay import replay_firings
 from tests.recordings import DATA, recording
@@ -329,46 +327,6 @@ def test_a_latched_table_has_the_clean_ones_drums(tmp_path: Path) -> None:
     got = drums(drive, list(open_ring_log(table, drive.settings, right_options(how))))
     assert len(got) == len(want)
     assert all(math.dist(a, b) < DRUM_M for a, b in zip(got, want, strict=True))
-
-
-def test_a_pipe_gives_its_first_firing_after_some_hundred_rows(tmp_path: Path) -> None:
-    drive = make_drive(3, "p3dx", "room", "specular")
-    table = written(drive, Convention(heading="cw"), np.random.default_rng(3), tmp_path / "table.csv")
-    lines = table.read_bytes().splitlines(keepends=True)
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    is_read = Event()
-
-    def write() -> None:
-        with pipe.open("wb") as file:
-            file.writelines(lines[: FIRST_OF_PIPE + 50])
-            file.flush()
-            is_read.wait(60.0)
-            file.writelines(lines[FIRST_OF_PIPE + 50 :])
-
-    writer = Thread(target=write)
-    writer.start()
-    firings = open_ring_log(pipe, drive.settings, RingLogOptions(heading="cw"))
-    got = [next(firings)]
-    is_read.set()
-    got += firings
-    writer.join()
-    check_right(got, drive, Convention(heading="cw"))
-
-
-def test_a_pipe_whose_later_rows_show_other_conventions_is_refused() -> None:
-    drive = make_drive(3, "p3dx", "room", "specular")
-    rows = [
-        Firing(float(t), Pose(x, y, -theta), -yaw, ranges)
-        for t, (x, y, theta, yaw), ranges in zip(drive.t, drive.pose, drive.ranges, strict=True)
-    ]
-    first, said = 30, list[str]()
-    still = [replace(rows[0], ranges_m=row.ranges_m) for row in rows[:first]]
-    firings = converted_firings(
-        [*still, *rows], Path("pipe"), drive.settings, RingLogOptions(), said.append, first=first
-    )
-    with pytest.raises(RingLogError, match=r"--heading cw|--length-unit m "):
-        list(firings)
 
 
 def test_a_ring_that_cannot_fire_as_its_file_says_is_good_for_a_log(tmp_path: Path) -> None:
