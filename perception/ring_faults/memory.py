@@ -9,8 +9,6 @@ from perception.bounds import FINITE, PLACE, POSITIVE, Count, Flag, Place
 from perception.kernel import Floats, kernel
 from perception.records import Record
 
-NO_ECHO_M: Final = -1.0
-"""In place of the range of a reading without an echo, m."""
 HALVES: Final = 2
 """Parts of the ring that may fail by themselves: all of it, and what looks ahead."""
 QUARTERS: Final = 3
@@ -25,7 +23,7 @@ MOVES: Final = 1.2
 
 
 Look: TypeAlias = tuple[float, float, float, float]
-"""A reading (m; `NO_ECHO_M` without an echo), the sensor's place (x, y, m), and its axis (rad)."""
+"""A reading (m; `NO_RANGE` without an echo), the sensor's place (x, y, m), and its axis (rad)."""
 Reception: TypeAlias = tuple[float, float, float]
 """Half the beam's width (rad), the difference of equal readings (m), and how far the ring listens (m)."""
 
@@ -34,7 +32,7 @@ class SensorPlace(Record):
     """Where a sensor was at a reading, in the odometry's frame."""
 
     range_m: Annotated[float, PLACE]
-    """The reading, m; `NO_ECHO_M` without an echo."""
+    """The reading, m; `NO_RANGE` without an echo."""
     x: Place
     """Place of the sensor, m."""
     y: Place

@@ -53,8 +53,9 @@ from perception.ring_faults.motion_tests import (
 from perception.ring_faults.mounting import DOUBTED_NAT, EXCLUDED_NAT, possible_places
 from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS, PastLooks
 from perception.ring_faults.wiring import LOOK_FIELDS, LOOKS, SENSORS_MAX, Wiring, weigh_turn, weigh_wiring
-from perception.sensor_faults.monitor import TOLERANCE_MIN_M, TOLERANCE_STEPS
+from perception.sensor_faults.monitor import TOLERANCE_STEPS
 from perception.sensor_mounts import mounts_array, ring_pose, turn_mounts
+from perception.shared_numbers import TOLERANCE_MIN_M
 
 _TURNED: Final = (
     "the ranges change as if the ring were mounted turned by {} against the robot file: check how it is mounted, "

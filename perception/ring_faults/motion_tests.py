@@ -26,7 +26,6 @@ from perception.ring_faults.memory import (
     HALVES,
     LOOK_KINDS,
     MOVES,
-    NO_ECHO_M,
     QUARTERS,
     EchoTrace,
     Look,
@@ -43,6 +42,7 @@ from perception.ring_faults.repeats import (
 from perception.ring_faults.replays import PAST_LOOKS, PastLooks, weigh_replay
 from perception.sensor_faults.wall import NOISE_SHARE
 from perception.sensor_mounts import RingPose
+from perception.shared_numbers import NO_RANGE
 
 CHANGE_NAT: Final = math.log(3e5 / 0.002)
 """`EVIDENCE_NAT` for changes from one round of the firing pattern to the next, of which a day has 3·10⁵, nat."""
@@ -265,7 +265,7 @@ def check_motion(
         past.counts[:] = 0
         for i in range(len(echoes)):
             echoes[i].is_known = echoes[i].is_compared = echoes[i].is_anchored = echoes[i].agreed = 0
-            echoes[i].heard.range_m = echoes[i].agreed_m = NO_ECHO_M
+            echoes[i].heard.range_m = echoes[i].agreed_m = NO_RANGE
     elif moved > 0.0:
         all_of.travel_rad = math.atan2(y - all_of.y, x - all_of.x)
         all_of.path_m += moved
@@ -275,7 +275,7 @@ def check_motion(
     for i in range(ranges.shape[0]):
         if math.isnan(ranges[i]):
             continue
-        r = ranges[i] if ranges[i] < reach - tolerance else NO_ECHO_M
+        r = ranges[i] if ranges[i] < reach - tolerance else NO_RANGE
         own_x = x + c * mounts[i, 0] - s * mounts[i, 1]
         own_y = y + s * mounts[i, 0] + c * mounts[i, 1]
         axis = yaw + mounts[i, 2]
@@ -287,7 +287,7 @@ def check_motion(
         learn_noise(echoes[i], r, x, y, axis, tolerance, all_of)
         look = (r, own_x, own_y, axis)
         weigh_repeat(i, look, yaw, is_ahead, mounts, reception, echoes, ring)
-        heard_before = echoes[i].before.range_m if echoes[i].is_compared else NO_ECHO_M
+        heard_before = echoes[i].before.range_m if echoes[i].is_compared else NO_RANGE
         nats = weigh_replay(i, look, heard_before, reception, past)
         replayed = max(replayed, nats)
         weigh_look(i, look, is_ahead, reception, echoes, all_of)

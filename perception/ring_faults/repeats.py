@@ -10,8 +10,8 @@ from perception.kernel import Floats, kernel
 from perception.records import Records
 from perception.ring_faults.changes import TURNING_SHARE
 from perception.ring_faults.memory import EchoTrace, Look, Reception, RingTrace, SensorPlace, mark
-from perception.sensor_faults.monitor import TOLERANCE_MIN_M
 from perception.sensor_faults.wall import NOISE_SHARE, towards_wall
+from perception.shared_numbers import TOLERANCE_MIN_M
 
 REPEAT_M: Final = TOLERANCE_MIN_M
 """Readings that differ by no more repeat each other, m: what is old may come with noise of a few millimetres."""

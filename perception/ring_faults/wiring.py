@@ -13,9 +13,10 @@ from typing import Final, NamedTuple
 
 from config.robot import BY_HAND_MAX
 from perception.kernel import Floats, Ints, kernel
-from perception.ring_faults.memory import NO_ECHO_M, Reception
+from perception.ring_faults.memory import Reception
 from perception.sensor_faults.wall import NOISE_SHARE
 from perception.sensor_mounts import RingPose
+from perception.shared_numbers import NO_RANGE
 
 SENSORS_MAX: Final = BY_HAND_MAX
 """Greatest ring that is tested: the work grows with the third power of its sensors."""
@@ -116,7 +117,7 @@ def along_axis(mounts: Floats, k: int) -> float:
 @kernel
 def beyond(r: float, offset: float) -> float:
     """Return how far from the middle an echo is, m, of a sensor so far along its axis; below zero for silence."""
-    return r + offset if r >= 0.0 else NO_ECHO_M
+    return r + offset if r >= 0.0 else NO_RANGE
 
 
 @kernel
@@ -239,7 +240,7 @@ def weigh_wiring(
             continue
         new = looks[i, counts[i] % size]
         new[0], new[1], new[2] = yaw, x, y
-        new[3] = ranges[i] if ranges[i] < reach - tolerance else NO_ECHO_M
+        new[3] = ranges[i] if ranges[i] < reach - tolerance else NO_RANGE
         counts[i] += 1
         if counts[i] <= LATER:
             continue

@@ -19,6 +19,7 @@ from perception.angles import wrapped
 from perception.kernel import kernel
 from perception.records import Records
 from perception.sensor_faults.memory import LOOKS_KEPT, RingMemory, SensorLook, SensorMemory
+from perception.shared_numbers import SAME_ECHO_M
 
 DEAF_NAT: Final = math.log(1e8)
 """Evidence that names a sensor, nat: a day has some 10⁵ such looks of each of two dozen sensors."""
@@ -32,8 +33,6 @@ LOOKS_APART_M: Final = 0.1
 """A look that is nearer than this to the one before, and turned by less than a quarter of the beam, is not kept."""
 AGAIN_M: Final = 0.3
 """Looks that count are this far apart, or turned by a whole beam, as others are alike."""
-SAME_ECHO_M: Final = 0.3
-"""Echoes that differ by less than this come from the same place, m."""
 BESIDE_RAD: Final = math.radians(60.0)
 """Only echoes whose axes differ by less than this from that of a look are compared with it."""
 

@@ -17,11 +17,11 @@ from perception.bayes.inference.cross_path import is_crossed
 from perception.bayes.inference.likelihood import bounded_exp
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY
-from perception.bayes.memory.parameters import EXPLAINED_ERROR_SIGMAS
 from perception.bayes.memory.scratch import BearingErrors
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CircleTrack, StateRecord
 from perception.kernel import kernel
+from perception.shared_numbers import OUTLIER_SIGMAS, ROUNDING
 
 OUTLINE_SIGMA_M: Final = 0.05
 """Deviation of an unknown outline from a model's: that of boxes of its size."""
@@ -41,8 +41,6 @@ OTHER_RADIUS_ERROR_M: Final = 0.04
 """Greatest standard deviation at which a radius is compared; before that the rivals suffice."""
 BIN_RAD: Final = math.tau / BEARING_BINS
 """Bearing between two bins of a track's reservoir."""
-DETERMINANT_MIN: Final = 1e-9
-"""Least determinant of the centre's information, as a share of its diagonal: with less there is one bearing only."""
 
 
 @kernel
@@ -96,7 +94,7 @@ def average_errors(bearing: BearingErrors) -> None:
     """Write the mean of a bearing's errors (m) and its accuracy, the inverse of that mean's standard deviation (1/m).
 
     It needs the errors and the sum of their variances, of `sort_errors`. An error farther from the median than
-    `EXPLAINED_ERROR_SIGMAS` counts as that far. With fewer than `OUTLINE_READINGS_MIN` errors the accuracy is 0 and
+    `OUTLIER_SIGMAS` counts as that far. With fewer than `OUTLINE_READINGS_MIN` errors the accuracy is 0 and
     the mean is not written.
     """
     n = bearing.count
@@ -105,7 +103,7 @@ def average_errors(bearing: BearingErrors) -> None:
         return
     variance = bearing.variance / n
     median = 0.5 * (bearing.errors[(n - 1) // 2] + bearing.errors[n // 2])
-    most = EXPLAINED_ERROR_SIGMAS * math.sqrt(variance)
+    most = OUTLIER_SIGMAS * math.sqrt(variance)
     total = 0.0
     for k in range(n):
         total += min(most, max(-most, bearing.errors[k] - median))
@@ -187,7 +185,7 @@ def round_lead(s: StateRecord, p: SettingsRecord, n: int) -> float:
         if own.ahead[j] < p[0].cos_half_angle * own.distance[j]:
             continue
         variance = var0 + rel2 * q.range_m * q.range_m
-        most = EXPLAINED_ERROR_SIGMAS * math.sqrt(variance)
+        most = OUTLIER_SIGMAS * math.sqrt(variance)
         e = min(most, max(-most, e))
         ux, uy = own.slope_x[j], own.slope_y[j]
         is_slant = is_crossed(q) or own.rays > 0
@@ -202,7 +200,7 @@ def round_lead(s: StateRecord, p: SettingsRecord, n: int) -> float:
         ye += uy * e / variance
         re -= along * e / variance
     det = xx * yy - xy * xy
-    if det <= DETERMINANT_MIN * xx * yy:
+    if det <= ROUNDING * xx * yy:
         return 0.0
     # What the centre explains of the radius, and of the errors.
     ax = (yy * xr - xy * yr) / det

@@ -66,8 +66,6 @@ ELSEWHERE_PER_M: Final = 0.02 / FOOT_M
 """Density of a middle reading that hit something else."""
 RANGE_VARIANCE_MIN_M2: Final = 1e-6 * FOOT_M * FOOT_M
 """Least variance of a range, and of a fitted centre, so that perfect ones do not divide by zero."""
-EXPLAINED_ERROR_SIGMAS: Final = 3.0
-"""Greatest error of an explained range, in σ, beyond half its rounding; farther ones count as that far in a mean."""
 RESIDUAL_HITS_MIN: Final = 25.0
 """A certain object's residuals count from this many hits on."""
 RESIDUAL_EVERY: Final = 3
@@ -327,8 +325,6 @@ NO_WALL_LEAD_NAT: Final = -4.0
 """Lead of a wall at which it is excluded. Walls are the most frequent alternative."""
 NAMED_DISPERSION_MIN: Final = 0.008
 """Least dispersion of the axes of an object seen from two sides; an object straight ahead has less."""
-NAME_KEPT_PROBABILITY: Final = 0.5
-"""Least probability at which a name is kept: likelier than everything else together."""
 NAMED_SIGMA_MAX_M: Final = 0.17 * FOOT_M
 """Greatest standard deviation of a named circle along either axis."""
 PLACED_SIGMA_M: Final = 0.15
@@ -383,8 +379,6 @@ UNSURE_FACTOR: Final = 4.0
 """Factor on the evidence of an object that is not certain, so that it is refined earlier."""
 UNSURE_ROOT_M: Final = 0.03 * FOOT_M
 """An object is not certain if its position is less certain than this, and perhaps wrong."""
-CERTAIN_PROBABILITY: Final = 0.95
-"""An object less probable than this is not certain."""
 RESERVOIR_OFFSET: Final = 8.0
 """Readings added to an object's count, so that an object with few is not refined at every reading."""
 FINAL_VALUE: Final = 1e-6

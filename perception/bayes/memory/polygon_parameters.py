@@ -171,9 +171,6 @@ POLYGON_WALL_BEYOND_M: Final = 2.0 * FOOT_M
 
 # --- Which polygons are reported, and how --------------------------------------------------------------------------
 
-POLYGON_PROBABILITY: Final = 0.9
-"""A polygon is established from this probability on, and reported, or from the user's `report_probability` if that is
-less."""
 POLYGON_NEAR_M: Final = 6.5 * FOOT_M
 """Greatest distance of the nearest sensor that heard a reported body."""
 POLYGON_DISPERSION_MIN: Final = 0.02

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 from perception.bayes.inference.noise_estimation import noise_variance
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import HISTORY, Reading
 from perception.bayes.memory.parameters import (
     BASELINE_MAX_M,
@@ -24,6 +23,7 @@ from perception.bayes.memory.state import StateRecord
 from perception.bayes.segments.segment_list import put_segment
 from perception.bayes.segments.segment_pairs import tangent
 from perception.kernel import kernel
+from perception.shared_numbers import FAR
 
 
 @kernel

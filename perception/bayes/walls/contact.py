@@ -15,6 +15,7 @@ from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import ESTABLISHED, CircleTracks
 from perception.bayes.memory.wall_records import CORNERS_MAX, MAX_WALLS, Wall, WallMap
 from perception.kernel import kernel
+from perception.shared_numbers import LIKELY
 
 NOWHERE, FOOT, BEAM_EDGE = range(3)
 """Where an echo comes from."""
@@ -33,9 +34,6 @@ END_SLACK_M: Final = 0.05
 """Uncertainty of the place of a wall's end."""
 CORNER_SLACK_M: Final = 0.03
 """Uncertainty of the place of a corner."""
-HIDING_PROBABILITY: Final = 0.9
-"""Least probability of a round object without a name that hides what lies behind it, and that explains a wall's
-echoes."""
 ONLY_NAMED: Final = 2.0
 """A probability that only named circles have."""
 WENT_ON_M: Final = 0.05
@@ -341,7 +339,7 @@ def is_hidden(tracks: CircleTracks, q: Reading, x: float, y: float) -> bool:
     d2 = dx * dx + dy * dy
     for t in range(len(tracks)):
         track = tracks[t]
-        if track.status != ESTABLISHED or (track.is_named == 0 and track.probability < HIDING_PROBABILITY):
+        if track.status != ESTABLISHED or (track.is_named == 0 and track.probability < LIKELY):
             continue
         cx = track.x - q.x
         cy = track.y - q.y

@@ -14,6 +14,7 @@ from perception.bayes.walls.contact import are_mirrors, edges_answer
 from perception.bayes.walls.evidence import SYSTEMATIC_M, judge
 from perception.bayes.walls.numbers import number_spans
 from perception.kernel import kernel
+from perception.shared_numbers import OUTLIER_SIGMAS
 
 SLOPE_SIGMA: Final = 0.15
 """Prior of a wall's slope in its frame."""
@@ -38,10 +39,8 @@ CRACK_PASSES_MIN: Final = 3.0
 """Passes in a narrower gap that make it an opening."""
 STRAY_BINS: Final = 2
 """Neighbours on either side with which a bin is compared with the line."""
-STRAY_SIGMAS: Final = 3.0
-"""Echoes whose mean lies behind the line by so many σ and `STRAY_SLACK_M` come from something else."""
 STRAY_SLACK_M: Final = 0.012
-"""Distance in `STRAY_SIGMAS`: such echoes come mostly from the ends of an opening."""
+"""Distance in `OUTLIER_SIGMAS`: such echoes come mostly from the ends of an opening."""
 STRAY_BEFORE_M: Final = 0.03
 """Echoes that lie this far before the line come from another wall at its corner, before that was known."""
 PASSED_MIN: Final = 1.5
@@ -152,7 +151,7 @@ def is_stray(room: WallMap, wall: Wall, b: int) -> bool:
             error += of.precision * mean_error(wall, k)
     if edges_answer(room) and passes >= PASSED_MIN and passes > PASSED_SHARE * total:
         return True
-    slack = STRAY_SIGMAS / math.sqrt(precision)
+    slack = OUTLIER_SIGMAS / math.sqrt(precision)
     return error / precision > slack + STRAY_SLACK_M or error / precision < -slack - STRAY_BEFORE_M
 
 

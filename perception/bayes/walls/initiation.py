@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import Memory, StateRecord
@@ -42,6 +41,7 @@ from perception.bayes.walls.numbers import number_spans
 from perception.bayes.walls.support import copy_near, support
 from perception.kernel import kernel
 from perception.records import Structured
+from perception.shared_numbers import FAR
 
 CANDIDATES_MAX: Final = 8
 """Lines that are scored for one echo."""

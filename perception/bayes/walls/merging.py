@@ -24,7 +24,6 @@ from perception.bayes.walls.bins import HALF, clear_wall, free, is_covered, midd
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
     FOOT,
-    HIDING_PROBABILITY,
     NOWHERE,
     ONLY_NAMED,
     SAME_SIGMAS,
@@ -44,6 +43,7 @@ from perception.bayes.walls.evidence import FLAT_BINS_MIN
 from perception.bayes.walls.fit import fit_walls
 from perception.kernel import kernel
 from perception.records import Structured
+from perception.shared_numbers import LIKELY
 
 SAME_TURN_RAD: Final = 0.14
 """Greatest angle between two parts of a wall."""
@@ -266,7 +266,7 @@ def drop_explained(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, turn
         count += 1
         # A barrel's side is a wall's until it is heard from farther round.
         is_straight = is_on_straight_span(room.walls[own], middle_of(b))
-        least = ONLY_NAMED if is_straight else HIDING_PROBABILITY
+        least = ONLY_NAMED if is_straight else LIKELY
         is_taken = is_from_circle(room, tracks, of.newest, p, least)
         # From afar a wall's echoes are as long as those of the corner in which it ends.
         is_taken = is_taken or (not is_straight and corner_of(room, of.newest, p) >= 0)

@@ -13,7 +13,6 @@ from typing import Final
 
 import numpy as np
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import Memory, StateRecord
@@ -51,6 +50,7 @@ from perception.bayes.walls.corners import (
     find_corners,
 )
 from perception.kernel import Floats, kernel
+from perception.shared_numbers import FAR
 
 ECHOES_MIN: Final = 8
 """Remembered echoes, from afar, that show a corner; `EDGE_ECHOES_MIN` from near show an edge."""

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.inference.reservoir import copy_reading
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.settings_record import SettingsRecord
@@ -24,7 +23,6 @@ from perception.bayes.walls.contact import (
     EXPLAINED_SIGMAS,
     FIRM_WEIGHT,
     FOOT,
-    HIDING_PROBABILITY,
     NOWHERE,
     SPAN_MARGIN_M,
     are_mirrors,
@@ -43,6 +41,7 @@ from perception.bayes.walls.contact import (
 from perception.bayes.walls.evidence import SURE_SPAN_WEIGHT
 from perception.bayes.walls.fit import OFFSET_INFORMATION, SLOPE_SIGMA
 from perception.kernel import Floats, kernel
+from perception.shared_numbers import FAR, LIKELY
 
 RECENT_SPACING_M: Final = 0.08
 """Least distance between the recent readings of a sensor that nothing explains, and between the remembered ones."""
@@ -249,7 +248,7 @@ def is_of_another(room: WallMap, tracks: CircleTracks, q: Reading, p: SettingsRe
             other = abs(q.range_m - expected) / tolerance(room, wall, along, expected, dot)
             if other < min(1.0, error + AS_WELL):
                 return True
-    return is_from_circle(room, tracks, q, p, HIDING_PROBABILITY)
+    return is_from_circle(room, tracks, q, p, LIKELY)
 
 
 @kernel

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.inference.reservoir import copy_reading
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
@@ -62,6 +61,7 @@ from perception.bayes.walls.noise import add_residual, estimate_noise
 from perception.bayes.walls.points import LONGER_SIGMAS, find_heard_points
 from perception.bayes.walls.review import RECENT_SPACING_M, remember, review
 from perception.kernel import kernel
+from perception.shared_numbers import FAR
 
 GROWTH_M: Final = 0.75
 """A wall may continue this far beyond its spans."""

@@ -11,15 +11,13 @@ from typing import Final, TypeAlias
 from perception.kernel import Floats, kernel
 from perception.localization.drift.landmark_filter import innovation_variance, rows_used
 from perception.localization.drift.landmark_state import FIRST, EstimateRecord, SonarModel, X, Y
+from perception.shared_numbers import OUTLIER_SIGMAS
 
 GATE: Final = 10.8
 """χ² of one degree of freedom that a true reading exceeds in one of a thousand cases."""
 OWN_M: Final = 0.15
 """A range farther than this from a landmark's is of something else, however uncertain the landmark is."""
 MARGIN_RAD: Final = math.radians(1.0)
-MARGIN_SIGMAS: Final = 3.0
-"""This far inside the beam a landmark must answer, and this far outside it may: a fixed part, and standard deviations
-of its bearing."""
 NO_LANDMARK: Final = -1
 """In place of a landmark's number."""
 HIDING_RADII: Final = 1.1
@@ -137,7 +135,7 @@ def associate(
         if d <= landmark.radius or dx * ax + dy * ay < 0.0:
             continue
         inside = sonar.half_angle - abs(math.atan2(ax * dy - ay * dx, ax * dx + ay * dy))
-        margin = MARGIN_RAD + MARGIN_SIGMAS * math.sqrt(bearing_variance(covariance, i, dx, dy))
+        margin = MARGIN_RAD + OUTLIER_SIGMAS * math.sqrt(bearing_variance(covariance, i, dx, dy))
         if inside < -margin:
             continue
         predicted = est.range_scale * (d - landmark.radius)

@@ -8,8 +8,8 @@ inverted. Each costs two passes over the covariance.
 from __future__ import annotations
 
 import math
-from typing import Final
 
+from perception.angles import SAME_RAD
 from perception.kernel import Floats, kernel
 from perception.localization.drift.landmark_state import (
     FIRST,
@@ -24,9 +24,6 @@ from perception.localization.drift.landmark_state import (
     X,
     Y,
 )
-
-SMALL_RAD: Final = 1e-6
-"""Below this angle the series of sin a/a is used."""
 
 
 @kernel
@@ -156,7 +153,7 @@ def move_points(e: EstimateRecord, turn: float, gain: Floats, factor: float) -> 
     """
     est = e[0]
     c, s = math.cos(turn), math.sin(turn)
-    if abs(turn) < SMALL_RAD:
+    if abs(turn) < SAME_RAD:
         a, b = 1.0, 0.5 * turn
     else:
         a, b = s / turn, (1.0 - c) / turn

@@ -27,6 +27,7 @@ from perception.localization.drift.landmark_state import (
     SonarModel,
 )
 from perception.sensor_mounts import RingPose, SensorPose
+from perception.shared_numbers import NO_RANGE, OUTLIER_SIGMAS
 
 SOFT: Final = 6.25
 """Normalised squared innovation from which on a reading's weight is reduced: its tails are heavier than a bell's."""
@@ -45,12 +46,8 @@ NOISE_MAX: Final = 25.0
 """Greatest estimate of the noise, as a factor on the nominal variance."""
 FIT_MEMORY: Final = 0.03
 """Share of one expected echo in `Estimate.fit_share`."""
-NO_RANGE: Final = -1.0
-"""In place of the range of a landmark that was not heard, m."""
 EDGE_RAD: Final = math.radians(0.2)
 """Standard deviation of where a beam ends."""
-EDGE_SIGMAS: Final = 3.0
-"""That a landmark so far inside was heard, or one so far outside was not, says nothing about its bearing."""
 DROP_OUT: Final = 0.08
 """Share of the expected echoes that a sensor misses."""
 STRAY: Final = 0.02
@@ -176,7 +173,7 @@ def update_with_edge(
     else:
         share, rest = 1.0 - est.stray, est.stray + chance
     learn_stray(e, inside, chance)
-    if (z < -EDGE_SIGMAS) if chance < 0.0 else (z > EDGE_SIGMAS):
+    if (z < -OUTLIER_SIGMAS) if chance < 0.0 else (z > OUTLIER_SIGMAS):
         return
     density = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
     slope = share * density / ((rest + share * inside) * q)

@@ -19,11 +19,11 @@ from config.settings import GridConfig
 from drivers.messages import Firing
 from perception.bounds import COUNT, PLACE, bounds
 from perception.kernel import Floats
-from perception.mapping.grid.known_cells import EVEN
 from perception.mapping.grid.sight_lines import SightLines
 from perception.mapping.grid.window import Ring, Window
 from perception.percept import OccupancyWindow
 from perception.sensor_mounts import mounts_array
+from perception.shared_numbers import EVEN
 
 READINGS_PLACE_M: Final = 0.1
 """Readings on so much way are from one place."""

@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.angles import ROUNDING_RAD
 from perception.kernel import kernel
 from perception.mapping.surfaces.parameters import (
     ANSWER_MIN,
@@ -39,6 +38,7 @@ from perception.mapping.surfaces.parameters import (
 )
 from perception.mapping.surfaces.records import BLOCK, RIM, WORDS, CellCounts, KeptReading, LocalMap
 from perception.records import Records
+from perception.shared_numbers import ROUNDING
 
 BLUR: Final = 16.0
 """Sum of the weights 1, 2, 4 with which the hits of 3 × 3 cells are blurred."""
@@ -165,9 +165,9 @@ def enter_passes(cells: CellCounts, q: KeptReading, half: float, sign: int) -> N
 @kernel
 def away_from_zero(x: float) -> float:
     """Return a divisor: a number, or one of the same sign near it that is not so small."""
-    if abs(x) >= ROUNDING_RAD:
+    if abs(x) >= ROUNDING:
         return x
-    return ROUNDING_RAD if x >= 0.0 else -ROUNDING_RAD
+    return ROUNDING if x >= 0.0 else -ROUNDING
 
 
 @kernel

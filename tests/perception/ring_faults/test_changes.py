@@ -20,7 +20,8 @@ from perception.ring_faults.changes import (
     source,
     weigh_changes,
 )  # fmt: skip
-from perception.ring_faults.memory import NO_ECHO_M, EchoTrace, mark
+from perception.ring_faults.memory import EchoTrace, mark
+from perception.shared_numbers import NO_RANGE
 
 COUNT = 16
 AXES = np.arange(COUNT) * math.tau / COUNT
@@ -35,7 +36,7 @@ def looks(before: Floats, latest: Floats, moved_m: float = 0.1, turned_rad: floa
     """Return the memory of a ring that moved ahead and turned between two looks; infinite ranges are silences."""
     echoes = records(EchoTrace, zeros(EchoTrace, COUNT))
     for k in range(COUNT):
-        then, now = (r[k] if math.isfinite(r[k]) else NO_ECHO_M for r in (before, latest))
+        then, now = (r[k] if math.isfinite(r[k]) else NO_RANGE for r in (before, latest))
         echoes[k].is_compared = 1
         mark(echoes[k].before, then, 0.0, 0.0, AXES[k], 0.0)
         mark(echoes[k].latest, now, moved_m, 0.0, AXES[k] + turned_rad, moved_m)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perception.records import Records, records, zeros
-from perception.ring_faults.memory import EVIDENCE_NAT, NO_ECHO_M, EchoTrace, RingTrace, mark
+from perception.ring_faults.memory import EVIDENCE_NAT, EchoTrace, RingTrace, mark
 from perception.ring_faults.repeats import (
     EQUAL_NAT,
     EQUAL_PRIOR,
@@ -25,6 +25,7 @@ from perception.ring_faults.repeats import (
     repeats,
     weigh_repeat,
 )
+from perception.shared_numbers import NO_RANGE
 
 MOUNTS = np.array([[0.0, 0.0, math.radians(15.0 * k)] for k in range(24)])
 HALF = math.radians(12.0)
@@ -111,8 +112,8 @@ def test_a_sensor_should_change_once_for_each_width_of_its_beam_that_it_turns(
 def test_readings_with_a_little_noise_repeat_each_other() -> None:
     assert repeats(2.0, 2.004)
     assert not repeats(2.0, 2.02)
-    assert repeats(NO_ECHO_M, NO_ECHO_M)
-    assert not repeats(0.001, NO_ECHO_M)
+    assert repeats(NO_RANGE, NO_RANGE)
+    assert not repeats(0.001, NO_RANGE)
 
 
 def test_a_change_ahead_ends_the_evidence_and_one_behind_only_its_own() -> None:
@@ -128,7 +129,7 @@ def test_a_change_ahead_ends_the_evidence_and_one_behind_only_its_own() -> None:
     for x in (0.0, 0.01, 0.08):
         fire(0, 2.0, x)
         fire(12, 3.0, x)
-        fire(6, NO_ECHO_M, x)
+        fire(6, NO_RANGE, x)
     assert ring[0].repeated_nat == pytest.approx(2.0 * REPEAT_NAT)
     fire(12, 3.1, 0.08)
     assert ring[0].repeated_nat == pytest.approx(REPEAT_NAT)
@@ -196,7 +197,7 @@ def test_noise_is_learned_at_a_standstill_from_changes_that_noise_explains() -> 
     assert look(2.01) == pytest.approx(NOISY_NAT)
     assert look(2.01) == look(2.013, 0.0) + -EQUAL_NAT
     known = look(2.013)
-    for r, x in ((3.0, 0.0), (NO_ECHO_M, 0.0), (3.0, 0.0), (3.01, 0.1)):
+    for r, x in ((3.0, 0.0), (NO_RANGE, 0.0), (3.0, 0.0), (3.01, 0.1)):
         assert look(r, x) == pytest.approx(known), "a leap, silence and a reading after a way say nothing"
     for k in range(9):
         look(3.0 + 0.01 * (k % 2), 0.1)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from perception.bayes.memory import parameters as p
+from perception.shared_numbers import EVEN
 
 
 def test_a_name_is_kept_at_a_lower_probability_than_it_is_given() -> None:
-    assert p.DOUBT_PROBABILITY < p.NAME_KEPT_PROBABILITY < p.ESTABLISH_PROBABILITY
+    assert p.DOUBT_PROBABILITY < EVEN < p.ESTABLISH_PROBABILITY
 
 
 def test_a_longer_baseline_is_tried_than_the_longest_of_the_series() -> None:

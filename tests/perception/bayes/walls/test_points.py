@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.bayes.memory.state import Memory
 from perception.bayes.memory.wall_records import WallMap
@@ -27,6 +26,7 @@ from perception.bayes.walls.points import (
 )
 from perception.bayes.walls.report import room_report
 from perception.bayes.walls.reported_points import ALONE_EDGE_ECHOES
+from perception.shared_numbers import FAR
 from tests.naive_walls import line_cuts
 from tests.perception.bayes.random_tracks import P
 from tests.perception.bayes.rooms import SIGMA, fill, new_room, place_wall

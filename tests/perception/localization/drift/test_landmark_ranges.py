@@ -24,6 +24,7 @@ from perception.localization.drift.landmark_state import (
     Y,
 )
 from perception.records import Records, records, zeros
+from perception.shared_numbers import NO_RANGE
 from tests.naive_landmarks import Array
 
 HALF_ANGLE = math.radians(12.0)
@@ -192,7 +193,7 @@ def test_the_bearing_has_the_moments_of_the_exact_posterior(is_heard: bool, stra
     off = HALF_ANGLE + math.radians(outside_deg)
     e, covariance = new_filter([(0.4 + d * math.cos(off), d * math.sin(off))], sigma=d * sigma)
     e[0].stray = stray
-    kernels.update_with_edge(e, covariance, 0, *AHEAD, HALF_ANGLE, 0.0 if is_heard else kernels.NO_RANGE)
+    kernels.update_with_edge(e, covariance, 0, *AHEAD, HALF_ANGLE, 0.0 if is_heard else NO_RANGE)
     at, across = e[0].landmarks[0], np.array([-math.sin(off), math.cos(off)])
     found = across @ (at.x - 0.4 - d * math.cos(off), at.y - d * math.sin(off)) / d
     variance = across @ covariance[FIRST : FIRST + 2, FIRST : FIRST + 2] @ across / d**2
