@@ -17,6 +17,7 @@ from perception.bayes.inference.cross_path import is_crossed
 from perception.bayes.inference.likelihood import bounded_exp
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY
+from perception.bayes.memory.parameters import READINGS_MIN, SYSTEMATIC_M
 from perception.bayes.memory.scratch import BearingErrors
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CircleTrack, StateRecord
@@ -27,10 +28,6 @@ OUTLINE_SIGMA_M: Final = 0.05
 """Deviation of an unknown outline from a model's: that of boxes of its size."""
 OUTLINE_SCALE_RAD: Final = 0.45
 """Bearing over which that deviation changes."""
-OUTLINE_SURFACE_M: Final = 0.005
-"""Deviation of a model's own surface, and of the poses from which it was heard."""
-OUTLINE_READINGS_MIN: Final = 3
-"""Least readings of a bearing that counts, so that their median ignores an outlier."""
 OUTLINE_BEARINGS_MIN: Final = 4
 """Least bearings: two of them are needed for the place, and a third has an outlier now and then."""
 OTHER_RADIUS_SIGMA_M: Final = 0.2
@@ -94,12 +91,12 @@ def average_errors(bearing: BearingErrors) -> None:
     """Write the mean of a bearing's errors (m) and its accuracy, the inverse of that mean's standard deviation (1/m).
 
     It needs the errors and the sum of their variances, of `sort_errors`. An error farther from the median than
-    `OUTLIER_SIGMAS` counts as that far. With fewer than `OUTLINE_READINGS_MIN` errors the accuracy is 0 and
+    `OUTLIER_SIGMAS` counts as that far. With fewer than `READINGS_MIN` errors the accuracy is 0 and
     the mean is not written.
     """
     n = bearing.count
     bearing.accuracy = 0.0
-    if n < OUTLINE_READINGS_MIN:
+    if n < READINGS_MIN:
         return
     variance = bearing.variance / n
     median = 0.5 * (bearing.errors[(n - 1) // 2] + bearing.errors[n // 2])
@@ -108,7 +105,7 @@ def average_errors(bearing: BearingErrors) -> None:
     for k in range(n):
         total += min(most, max(-most, bearing.errors[k] - median))
     bearing.mean = median + total / n
-    bearing.accuracy = 1.0 / math.sqrt(variance / n + OUTLINE_SURFACE_M**2)
+    bearing.accuracy = 1.0 / math.sqrt(variance / n + SYSTEMATIC_M**2)
 
 
 @kernel

@@ -15,6 +15,7 @@ from perception.bayes.memory.elements import MAX_LINES, Reading
 from perception.bayes.memory.parameters import (
     CIRCLE_WALL_BEHIND,
     CIRCLE_WALL_BEYOND_M,
+    GATE_M,
     LINE_ANGLE_DRIFT_RAD2,
     LINE_ANGLE_VARIANCE_RAD2,
     LINE_DISTANCE_DRIFT_M2,
@@ -24,7 +25,6 @@ from perception.bayes.memory.parameters import (
     LINE_EDGE_GROW_M,
     LINE_EDGE_SLACK_M,
     LINE_FRONT_COS,
-    LINE_GROW_M,
     LINE_JOIN_M,
     LINE_LOG_ODDS_MAX,
     LINE_SAME_M,
@@ -244,7 +244,7 @@ def update_lines(s: StateRecord, p: SettingsRecord, m: int) -> None:
             associates = line.high - line.low > p[0].associating_line_m
             if dot >= p[0].cos_may_answer:
                 e = r - expected
-                if abs(e) < tight and reaches(line, foot, LINE_GROW_M):
+                if abs(e) < tight and reaches(line, foot, GATE_M):
                     if associates:
                         explain(s, i, k)
                     line.low = min(line.low, foot)

@@ -7,7 +7,7 @@ from typing import Final
 
 from perception.bayes.inference.noise_estimation import noise_variance, tolerance_m
 from perception.bayes.inference.reservoir import copy_reading
-from perception.bayes.memory.parameters import STILL_COS, STILL_M
+from perception.bayes.memory.parameters import STILL_COS, STILL_M, SYSTEMATIC_M
 from perception.bayes.memory.scratch import UNEXPLAINED
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import Sensor, StateRecord
@@ -16,8 +16,6 @@ from perception.shared_numbers import FAR
 
 COORDINATE_MAX_M: Final = 0.5 * FAR
 """A position farther than this from the odometry's origin is invalid: ranges this long mean silence."""
-STANDING_M: Final = 0.005
-"""A sensor that moved less is where it was; odometry trembles by less than this."""
 CHANGED_MIN: Final = 3
 """So many readings in turn that differ from the first one say that the surroundings have changed: of drop-outs of
 10 % one in a thousand series is so long. Each doubling of the looks before them asks for one more."""
@@ -95,7 +93,7 @@ def place_readings(
         last = sensor.last
         moved = math.hypot(x - last.x, y - last.y)
         is_near = moved < STILL_M and ux * last.axis_x + uy * last.axis_y > STILL_COS
-        if is_near and moved < STANDING_M:
+        if is_near and moved < SYSTEMATIC_M:
             if not says_new(sensor, r, tolerance_m(2.0 * half_box, 2.0 * (var0 + rel2 * min(r, last.range_m) ** 2))):
                 continue
         elif is_near and abs(r - last.range_m) <= half_box:

@@ -36,8 +36,6 @@ SEARCH_SHRINK: Final = 0.5
 """Factor on the steps when no move gains."""
 SEARCH_GAIN_MIN_NAT: Final = 1e-6
 """Smallest score gain that counts as progress."""
-SEARCH_FINEST_M: Final = 0.005 * FOOT_M
-"""Step below which a search ends: a tenth of the resolution, narrower than the likelihood's plateau."""
 SEARCH_EVERY: Final = 4
 """A pose whose covariance is known and that explains its readings is searched only once in this many refinements."""
 WIDE_SEARCHES_FIRST: Final = 4
@@ -71,16 +69,12 @@ REQUEST_SAME_M: Final = 0.25 * FOOT_M
 """A segment this near to a parallel one makes the same request."""
 POLYGON_AROUND_M: Final = 0.3 * FOOT_M
 """Segments up to this far off the farthest vertex may attract the body; circles up to there stand in its place."""
-POLYGON_RELAXATION_STEPS: Final = 3
-"""Greatest number of a polygon's relaxation steps."""
 POLYGON_RESTS_RAD: Final = 0.01
 """These steps end with turns below this and shifts below `POLYGON_RESTS_M`."""
 POLYGON_RESTS_M: Final = POLYGON_RESTS_RAD * FOOT_M
 """The shift that a turn by `POLYGON_RESTS_RAD` makes a foot away."""
 SIDE_SHIFTS: Final = (-0.3, 0.0, 0.3)
 """Where on a side the segment is laid, from its middle, in lengths of the side."""
-TRIAL_READINGS_MIN: Final = 8
-"""Least readings of a trial."""
 TRIAL_READINGS_MAX: Final = 80
 """Greatest number of readings that a trial scores: it is only compared with the other trials."""
 TRIAL_STEP_M: Final = 0.2 * FOOT_M
@@ -179,8 +173,6 @@ POLYGON_SIGMA_MAX_M: Final = 0.2 * FOOT_M
 """Greatest standard deviation of its position along either axis."""
 POLYGON_NAMED_HITS_SWEPT: Final = 12.0
 """Least hits of a reported body that many readings fit, in place of `MANY_HITS`."""
-POLYGON_SWEPT_READINGS: Final = 80
-"""Least readings, silences included, that bear on such a body and fit it."""
 POLYGON_INFLATION: Final = 1.15
 """Factor on a polygon's reported covariance: the noise does not include the influence of its neighbours."""
 POLYGON_TURN_SIGMA_RAD: Final = math.radians(MAY_ANSWER_DEG)

@@ -13,8 +13,8 @@ from perception.bayes.memory.elements import round_label
 from perception.bayes.memory.parameters import (
     CIRCLE_INFLATION,
     GATE_M,
+    LINE_JOIN_M,
     PLACED_SIGMA_M,
-    ROOM_CORNER_M,
     ROOM_MARGIN_M,
     UNKNOWN_HITS_MIN,
     WALL_ECHOES_MIN,
@@ -25,6 +25,7 @@ from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, Memory, PolygonTrack
 from perception.bayes.reports.claimed_echoes import own_echoes
 from perception.bayes.tracks.track_archive import TrackArchive
+from perception.bayes.walls.contact import PLACE_SLACK_M
 from perception.bayes.walls.crossing import CORNER_SINE_MIN
 from perception.bayes.walls.points import SPREAD_MIN_RAD
 from perception.bayes.walls.report import has_mirrors, room_report
@@ -45,9 +46,6 @@ CIRCLE_FIELDS: Final = (
 READINGS: Final = "readings"
 """Field of an archived circle."""
 NO_SURFACES: Final = np.empty((0, 4))
-WALL_OFF_M: Final = 0.05
-"""A post at the end of a sure wall, within `ROOM_MARGIN_M`, and this near to touching its line is the edge in which
-the wall ends: their ranges differ by less than the noise, and every wall ends somewhere."""
 Row = tuple[float, ...]
 
 
@@ -195,8 +193,8 @@ def rival_label(memory: Memory, x: float, y: float, radius: float) -> str:
         nx, ny = line["normal_x"], line["normal_y"]
         dx, dy = x - line["origin_x"], y - line["origin_y"]
         along = -ny * dx + nx * dy
-        is_within = line["low"] - ROOM_CORNER_M < along < line["high"] + ROOM_CORNER_M
-        if is_within and abs(nx * dx + ny * dy - line["distance"]) < ROOM_CORNER_M:
+        is_within = line["low"] - LINE_JOIN_M < along < line["high"] + LINE_JOIN_M
+        if is_within and abs(nx * dx + ny * dy - line["distance"]) < LINE_JOIN_M:
             sides.append((nx, ny, 1.0 if abs(line["low"] - along) < abs(line["high"] - along) else -1.0))
     for (ax, ay, way), (bx, by, other_way) in itertools.combinations(sides, 2):
         if way != other_way and way * (ax * by - ay * bx) < -CORNER_SINE_MIN:
@@ -220,7 +218,7 @@ def wall_edge(surfaces: Floats, x: float, y: float, radius: float) -> tuple[floa
     dx, dy = x - walls[:, 0], y - walls[:, 1]
     along, across = tx * dx + ty * dy, tx * dy - ty * dx
     beyond = np.abs(np.maximum(-along, along - length))
-    beyond[np.abs(across) > radius + WALL_OFF_M] = math.inf
+    beyond[np.abs(across) > radius + PLACE_SLACK_M] = math.inf
     if not (beyond < ROOM_MARGIN_M).any():
         return None
     k = int(beyond.argmin())

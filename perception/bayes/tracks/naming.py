@@ -14,6 +14,7 @@ from perception.bayes.memory.elements import MAX_POLYGONS, POLYGON_BIN_CAPACITY
 from perception.bayes.memory.parameters import (
     ALONE_LEAD_NAT,
     IN_WALL_NAT,
+    MANY_READINGS,
     NAMED_DISPERSION_MIN,
     NAMED_OVER_UNKNOWN,
     NAMED_OVER_UNKNOWN_ALONE,
@@ -26,7 +27,6 @@ from perception.bayes.memory.polygon_parameters import (
     POLYGON_NAMED_HITS_SWEPT,
     POLYGON_NEAR_M,
     POLYGON_SIGMA_MAX_M,
-    POLYGON_SWEPT_READINGS,
 )
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import ESTABLISHED, FREE, CircleTrack, CircleTracks, PolygonTrack, StateRecord
@@ -238,7 +238,7 @@ def is_sure_polygon(track: PolygonTrack, least: float) -> bool:
                 x += q.axis_x
                 y += q.axis_y
                 heard += 1
-    if track.hits < (POLYGON_NAMED_HITS_SWEPT if swept >= POLYGON_SWEPT_READINGS else MANY_HITS):
+    if track.hits < (POLYGON_NAMED_HITS_SWEPT if swept >= MANY_READINGS else MANY_HITS):
         return False
     return heard > 0 and nearest <= POLYGON_NEAR_M and 1.0 - math.hypot(x, y) / heard > POLYGON_DISPERSION_MIN
 

@@ -33,6 +33,7 @@ from perception.bayes.memory.parameters import (
     ESTABLISH_PROBABILITY,
     ESTABLISH_ROOT_M,
     FIT_LEAD_SIGMAS2,
+    FIT_ROUNDS,
     FIT_SOFTNESS,
     FITTED_REFINEMENTS,
     IN_WALL_NAT,
@@ -44,16 +45,15 @@ from perception.bayes.memory.parameters import (
     OTHER_FIT_STEPS,
     PLACED_STRAY_MAX_M,
     RANGE_VARIANCE_MIN_M2,
-    REPLACING_LINE_HITS_MIN,
+    READINGS_MIN,
     ROOT_CORRELATION_MAX,
     SWITCH_LEAD_NAT,
     SWITCH_ROOT_M,
     SWITCH_UNSEEN,
-    TENTATIVE_FIT_STEPS,
     TRACK_FIT_STEPS,
-    TRACK_READINGS_MIN,
     UNSURE_ROOT_M,
 )
+from perception.bayes.memory.polygon_parameters import POLYGON_HITS_MIN
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import (
     CONFIRMED,
@@ -82,7 +82,7 @@ def fit_start(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> 
     """
     fit = s[0].scratch.circle_fit
     noise = noise_variance(s, p)
-    steps = TENTATIVE_FIT_STEPS if track.status == TENTATIVE else TRACK_FIT_STEPS
+    steps = FIT_ROUNDS if track.status == TENTATIVE else TRACK_FIT_STEPS
     if not fit_circle(
         s[0].scratch.readings[:n],
         (track.x, track.y, track.radius),
@@ -252,7 +252,7 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
             track.leads[k] = v - track.log_likelihood_ratio
             if v > track.log_likelihood_ratio + max(prior, 0.0) + SWITCH_LEAD_NAT:
                 said = s[0].scratch.line_score
-                if said.hits >= REPLACING_LINE_HITS_MIN and said.high - said.low > LINE_LENGTH_MIN_M:
+                if said.hits >= POLYGON_HITS_MIN and said.high - said.low > LINE_LENGTH_MIN_M:
                     enter_line(s, s[0].scratch.line_fit, track.x, track.y, said)
                 return False
         else:
@@ -313,7 +313,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     track.unseen = 0
     track.refinements += 1
     s[0].refinements += 1
-    if n < TRACK_READINGS_MIN:
+    if n < READINGS_MIN:
         drop_track(track)
         return
     x, y = track.x, track.y

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.memory.parameters import SYSTEMATIC_M
 from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import StateRecord
 from perception.bayes.memory.wall_records import CANDIDATE, SPANS_MAX, WALL_BIN_M, WALL_BINS, Wall, WallMap
 from perception.bayes.walls.bins import HALF, clear_wall, is_covered, mean_error, middle_of
-from perception.bayes.walls.contact import are_mirrors, edges_answer
-from perception.bayes.walls.evidence import SYSTEMATIC_M, judge
+from perception.bayes.walls.contact import CORNER_SLACK_M, are_mirrors, edges_answer
+from perception.bayes.walls.evidence import judge
 from perception.bayes.walls.numbers import number_spans
 from perception.kernel import kernel
 from perception.shared_numbers import OUTLIER_SIGMAS
@@ -41,8 +42,6 @@ STRAY_BINS: Final = 2
 """Neighbours on either side with which a bin is compared with the line."""
 STRAY_SLACK_M: Final = 0.012
 """Distance in `OUTLIER_SIGMAS`: such echoes come mostly from the ends of an opening."""
-STRAY_BEFORE_M: Final = 0.03
-"""Echoes that lie this far before the line come from another wall at its corner, before that was known."""
 PASSED_MIN: Final = 1.5
 """Passes of a bin and its neighbours that make it open."""
 PASSED_SHARE: Final = 0.4
@@ -152,7 +151,7 @@ def is_stray(room: WallMap, wall: Wall, b: int) -> bool:
     if edges_answer(room) and passes >= PASSED_MIN and passes > PASSED_SHARE * total:
         return True
     slack = OUTLIER_SIGMAS / math.sqrt(precision)
-    return error / precision > slack + STRAY_SLACK_M or error / precision < -slack - STRAY_BEFORE_M
+    return error / precision > slack + STRAY_SLACK_M or error / precision < -slack - CORNER_SLACK_M
 
 
 @kernel

@@ -23,12 +23,13 @@ from perception.bayes.memory.wall_records import (
 from perception.bayes.walls.bins import HALF, clear_wall, free, is_covered, middle_of
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
+    EDGE_SIGMA_M,
     FOOT,
     NOWHERE,
     ONLY_NAMED,
+    PLACE_SLACK_M,
     SAME_SIGMAS,
     SPAN_MARGIN_M,
-    WENT_ON_M,
     contact,
     corner_of,
     edges_answer,
@@ -61,8 +62,6 @@ EDGE_BINS: Final = 24
 """A frame moves when readings come so near its first or its last bin."""
 FRAME_TURN_MAX: Final = 0.02
 """A frame turns when the line is turned against it by more than this, rad."""
-HIDDEN_WITHIN_M: Final = 0.1
-"""What lies this far inside another wall's ends, and `WENT_ON_M` behind it, is not heard."""
 
 
 @kernel
@@ -199,8 +198,8 @@ def is_from_wall(room: WallMap, wall: Wall, q: Reading, p: SettingsRecord) -> bo
         slack = tolerance(room, wall, along, expected, dot)
         if abs(error) < slack and is_on_span(wall, along, SPAN_MARGIN_M):
             return True
-        is_certain = kind == FOOT and dot >= p[0].cos_must_answer and is_on_span(wall, along, -HIDDEN_WITHIN_M)
-        if is_certain and error > slack + WENT_ON_M:
+        is_certain = kind == FOOT and dot >= p[0].cos_must_answer and is_on_span(wall, along, -EDGE_SIGMA_M)
+        if is_certain and error > slack + PLACE_SLACK_M:
             return True
     return is_from_end(room, wall, q, p)
 

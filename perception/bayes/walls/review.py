@@ -14,6 +14,7 @@ from typing import Final
 
 from perception.bayes.inference.reservoir import copy_reading
 from perception.bayes.memory.elements import Reading
+from perception.bayes.memory.polygon_parameters import GRAZING_COS
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CircleTracks, StateRecord
 from perception.bayes.memory.wall_records import MAX_WALLS, REMEMBERED_MAX, WALL_BINS, Wall, WallMap
@@ -25,6 +26,7 @@ from perception.bayes.walls.contact import (
     FOOT,
     NOWHERE,
     SPAN_MARGIN_M,
+    SURE_SPAN_WEIGHT,
     are_mirrors,
     contact,
     edge_direction,
@@ -38,7 +40,6 @@ from perception.bayes.walls.contact import (
     wall_normal,
     wall_point,
 )
-from perception.bayes.walls.evidence import SURE_SPAN_WEIGHT
 from perception.bayes.walls.fit import OFFSET_INFORMATION, SLOPE_SIGMA
 from perception.kernel import Floats, kernel
 from perception.shared_numbers import FAR, LIKELY
@@ -61,12 +62,8 @@ SILENCE_NAT: Final = 2.0
 """Evidence of a silence against the place."""
 PLACE_NAT: Final = 10.0
 """Greatest evidence of one place: the errors of its readings are not independent."""
-GRAZING_MIN_COS: Final = 0.05
-"""Least cosine between a sensor's axis and the normal of the wall under review: its line is known well."""
 AS_WELL: Final = 0.3
 """Another wall explains an echo as well if its error, as a share of the greatest explained, is not larger by this."""
-FORGOTTEN_NAT: Final = 2.0
-"""Evidence for a place that was covered when its readings were still remembered."""
 SURE_PASSES: Final = 0.1
 """A place on a span of `SURE_SPAN_WEIGHT`, and of so small a share of passes, is its wall's."""
 UNHEARD_NAT: Final = 0.35
@@ -148,7 +145,7 @@ def weigh(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, k: int) -> No
     s2 = 1.0 / SLOPE_SIGMA**2
     for j in range(min(room.remembered_count, REMEMBERED_MAX)):
         q = room.remembered[j]
-        kind, expected, along, cosine = touch(wall, q, p, GRAZING_MIN_COS)
+        kind, expected, along, cosine = touch(wall, q, p, GRAZING_COS)
         b = bin_of(along)
         if kind == NOWHERE or not 0 <= b < WALL_BINS:
             continue
@@ -198,7 +195,7 @@ def stand_by_what_is_forgotten(wall: Wall, evidence: Floats) -> None:
     """Let the bins speak where no reading is remembered."""
     for b in range(WALL_BINS):
         if evidence[b] == 0.0 and wall.bins[b].is_held == 1 and is_covered(wall.bins[b]):
-            evidence[b] = FORGOTTEN_NAT
+            evidence[b] = SILENCE_NAT
 
 
 @kernel

@@ -39,7 +39,7 @@ from perception.bayes.walls.contact import (
     FOOT,
     NOWHERE,
     ONLY_NAMED,
-    WENT_ON_M,
+    PLACE_SLACK_M,
     contact,
     distance_and_foot,
     edges_answer,
@@ -54,7 +54,7 @@ from perception.bayes.walls.contact import (
     wall_point,
 )
 from perception.bayes.walls.corners import enter_echo, enter_looks, find_corners, point_of
-from perception.bayes.walls.fit import fit_walls
+from perception.bayes.walls.fit import GAP_MAX_M, fit_walls
 from perception.bayes.walls.initiation import try_wall
 from perception.bayes.walls.merging import drop_explained, merge_walls
 from perception.bayes.walls.noise import add_residual, estimate_noise
@@ -63,8 +63,6 @@ from perception.bayes.walls.review import RECENT_SPACING_M, remember, review
 from perception.kernel import kernel
 from perception.shared_numbers import FAR
 
-GROWTH_M: Final = 0.75
-"""A wall may continue this far beyond its spans."""
 KNOWN_SPACING_M: Final = 0.24
 """Least distance between the recent readings of a sensor that something explains; see `RECENT_SPACING_M`."""
 FIT_FIRINGS: Final = 2
@@ -114,7 +112,7 @@ def weaken(room: WallMap, tracks: CircleTracks, q: Reading, own: int, p: Setting
             if wall.weight > BEAM_WALL_WEIGHT_MIN and is_free and is_on_span(wall, along, -EDGE_WITHIN_M):
                 if abs(e) < slack:
                     room.edge_echoes += 1.0
-                elif e > slack + WENT_ON_M:
+                elif e > slack + PLACE_SLACK_M:
                     room.edge_silences += 1.0
         elif dot >= p[0].cos_must_answer and e > slack:
             b = bin_of(along)
@@ -215,7 +213,7 @@ def explain(room: WallMap, q: Reading, p: SettingsRecord, is_known: bool) -> tup
     if own >= 0:
         return own, kind, False
     if not is_known:
-        own, kind, error = explaining_wall(room, q, p, GROWTH_M)
+        own, kind, error = explaining_wall(room, q, p, GAP_MAX_M)
     error_of_point = enter_point(room, q, p, error)
     is_point = error_of_point < 1.0
     if not is_point:
