@@ -27,3 +27,7 @@ BESIDE_MAX_RAD: Final = math.radians(60.0)
 """Greatest angle between a surface's normal and a beam's edge at which the edge may still hear it."""
 NORMAL_DIRECTIONS: Final = 360
 """Directions of normals in which walls are looked for."""
+READING_M: Final = 0.1
+"""Readings of one sensor from poses nearer than this, in heading than `READING_RAD`, have the same error."""
+READING_RAD: Final = math.radians(6.0)
+"""Difference of headings in `READING_M`."""

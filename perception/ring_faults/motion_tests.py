@@ -24,6 +24,7 @@ from perception.ring_faults.changes import (
 from perception.ring_faults.memory import (
     EVIDENCE_NAT,
     HALVES,
+    LEADS_M,
     LOOK_KINDS,
     MOVES,
     QUARTERS,
@@ -53,8 +54,6 @@ RESTART_M: Final = 0.25
 AHEAD_COS: Final = math.cos(math.radians(100.0))
 """Sensors within 100° of the direction of travel look ahead: what the robot may drive into, and both its sides."""
 
-LEADS_M: Final = 0.5
-"""A known echo leads to expect the next one within this way of the ring, m."""
 REACH_SHARE: Final = 0.8
 """What is expected beyond this share of the ring's reach may be out of reach next time."""
 MISSED: Final = 0.9

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from config.robot import BY_HAND_MAX
 from perception.kernel import Floats, Ints, kernel
-from perception.ring_faults.memory import Reception
+from perception.ring_faults.memory import TURNED_SHARE, Reception
 from perception.sensor_faults.wall import NOISE_SHARE
 from perception.sensor_mounts import RingPose
 from perception.shared_numbers import NO_RANGE
@@ -24,16 +24,10 @@ LOOKS: Final = 32
 """Looks of each sensor that are kept, a quarter of the beam apart or more: a turn by 240° of beams of 30°."""
 LATER: Final = 8
 """A look is judged after so many later ones: others have looked there before it, or since."""
-LOOK_FIELDS: Final = 4
-"""The ring's direction (rad) and place x, y (m), and the reading, m; below zero without an echo."""
 LOOKS_PLACE_M: Final = 0.15
 """Looks from places that are no farther apart are compared, m."""
 AXIS_SHARE: Final = 0.35
 """Looks whose axes differ by no more than this share of half the beam are compared."""
-TURN_AXIS_SHARE: Final = 0.5
-"""The same for a whole turn, whose looks are half a beam apart or little more: so almost every one has another
-sensor's beside it. With .35 those of three sensors 25° apart fell between each other's: 16 of 24 exchanges were
-named, and 24 with this."""
 HEARD_ALIKE_M: Final = 0.08
 """Echoes from such places that differ by no more are of the same object, m."""
 AGREES: Final = 0.45
@@ -192,7 +186,7 @@ def weigh_turn(mounts: Floats, reception: Reception, wiring: Wiring, near: Float
         Out: evidence that sensors i < j are exchanged, for i = j that the sensor looks backwards, and for j = n that
         it is deaf, nat.
     """
-    reach, off = reception[2], TURN_AXIS_SHARE * reception[0]
+    reach, off = reception[2], TURNED_SHARE * reception[0]
     n, size = wiring.looks.shape[0], wiring.looks.shape[1]
     nats[:] = 0.0
     for i in range(n):

@@ -17,6 +17,7 @@ import numpy as np
 
 from drivers.messages import IDENTITY, Pose, wrap_angle
 from perception.kernel import Floats
+from perception.localization.drift.landmark_association import OWN_M
 
 PLACE_SIGMA_M: Final = 0.4
 """Standard deviation of a slip's shift before the echoes."""
@@ -40,11 +41,8 @@ PAIRED_SHARE: Final = 0.6
 """A pairing of a smaller share of the echoes is none."""
 BRANCHES_MAX: Final = 80
 """Branches that are followed at most: bounds the work."""
-ALIKE_M: Final = 0.15
-"""Two displacements are the same answer if their shifts differ by less than this and their turns by less than
-`ALIKE_RAD`."""
 ALIKE_RAD: Final = math.radians(6.0)
-"""Difference of turns in `ALIKE_M`."""
+"""Difference of turns in `OWN_M`."""
 
 GAIN_MIN: Final = 5.0
 """A landmark's squared innovations must fall by so much to be clearly better."""
@@ -172,8 +170,7 @@ def _squared(pose: Pose, echo: Echo, disc: Disc, half_angle: float) -> float:
 
 def _is_alike(one: Pose, other: Pose) -> bool:
     return (
-        math.hypot(one.x - other.x, one.y - other.y) < ALIKE_M
-        and abs(wrap_angle(one.theta - other.theta)) < ALIKE_RAD
+        math.hypot(one.x - other.x, one.y - other.y) < OWN_M and abs(wrap_angle(one.theta - other.theta)) < ALIKE_RAD
     )
 
 

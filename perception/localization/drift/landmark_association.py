@@ -16,7 +16,8 @@ from perception.shared_numbers import OUTLIER_SIGMAS
 GATE: Final = 10.8
 """χ² of one degree of freedom that a true reading exceeds in one of a thousand cases."""
 OWN_M: Final = 0.15
-"""A range farther than this from a landmark's is of something else, however uncertain the landmark is."""
+"""A range farther than this from a landmark's is of something else, however uncertain the landmark is; two
+displacements that differ by less, and turn alike by `joint_compatibility.ALIKE_RAD`, are the same answer."""
 MARGIN_RAD: Final = math.radians(1.0)
 NO_LANDMARK: Final = -1
 """In place of a landmark's number."""

@@ -11,6 +11,7 @@ from typing import Final
 
 from perception.kernel import Floats, kernel
 from perception.localization.drift.landmark_association import (
+    MARGIN_RAD,
     NO_LANDMARK,
     associate,
     bearing_variance,
@@ -34,18 +35,14 @@ SOFT: Final = 6.25
 NEAR_M: Final = 0.5
 """A range this near to a landmark's, but outside the gate, is a failure of that landmark."""
 FRESH_M: Final = 0.02
-"""A sensor's readings from poses nearer than this, and turned by less than `FRESH_RAD`, repeat one error of rounding;
-only the first is used."""
-FRESH_RAD: Final = math.radians(1.0)
-"""Turn in `FRESH_M`."""
+"""A sensor's readings from poses nearer than this, and turned by less than `MARGIN_RAD`, repeat one error of
+rounding; only the first is used."""
 NOISE_MEMORY: Final = 0.005
 """Share of one reading in the estimate of the noise."""
 NOISE_MIN: Final = 0.02
 """Least estimate of the noise, as a factor on the nominal variance."""
 NOISE_MAX: Final = 25.0
 """Greatest estimate of the noise, as a factor on the nominal variance."""
-FIT_MEMORY: Final = 0.03
-"""Share of one expected echo in `Estimate.fit_share`."""
 EDGE_RAD: Final = math.radians(0.2)
 """Standard deviation of where a beam ends."""
 DROP_OUT: Final = 0.08
@@ -54,7 +51,7 @@ STRAY: Final = 0.02
 """Share of the landmarks outside a beam that are heard, at first: of mirrors none is, many are where a drum answers
 with any part that is in the beam."""
 STRAY_MEMORY: Final = 0.03
-"""Weight of one look in that share."""
+"""Weight of one look in that share, and of one expected echo in `Estimate.fit_share`."""
 WILD_PER_M: Final = 0.01
 """Share of the readings that are of something else, for each metre of range: as many fit a landmark by chance."""
 CURVATURE_MIN: Final = 1e-6
@@ -66,7 +63,7 @@ PASSED_M: Final = 0.3
 @kernel
 def has_moved_since(last: LastUse, x: float, y: float, axis: float) -> bool:
     """Return whether a sensor at (x, y) (m), axis (rad), has moved or turned enough since its last reading."""
-    return last.is_known == 0 or abs(axis - last.axis) >= FRESH_RAD or math.hypot(x - last.x, y - last.y) >= FRESH_M
+    return last.is_known == 0 or abs(axis - last.axis) >= MARGIN_RAD or math.hypot(x - last.x, y - last.y) >= FRESH_M
 
 
 @kernel
@@ -267,7 +264,7 @@ def update_with_range(
     ):
         is_expected = False
     if is_expected:
-        est.fit_share += FIT_MEMORY * ((1.0 if best != NO_LANDMARK else 0.0) - est.fit_share)
+        est.fit_share += STRAY_MEMORY * ((1.0 if best != NO_LANDMARK else 0.0) - est.fit_share)
     is_missed = first != NO_LANDMARK and first != best and r > nearest + PASSED_M and nearest < sonar.range_max
     if is_missed and not is_landmark_hidden(e, first, x, y):
         update_with_edge(e, covariance, first, mx, my, axis, half_angle, NO_RANGE)

@@ -16,10 +16,12 @@ from perception.localization.drift.landmark_filter import propagate, rows_used, 
 from perception.localization.drift.landmark_ranges import STRAY, update_with_firing
 from perception.localization.drift.landmark_state import (
     FIRST,
+    LANDMARKS_MIN,
     ODOMETER,
     OFFSET,
     RANGE,
     ROWS_MAX,
+    SLIP_SHARE,
     TURN,
     Estimate,
     SonarModel,
@@ -45,12 +47,8 @@ WALK_WINDOW_M: Final = 0.25
 DRIFT_PLACE_WALK: Final = 0.0005**2
 """Variance of a displacement by odometry on each axis, m²/m. A base's distance errs by its scale, which the filter
 finds, and where wheels slip; what is left is below what the echoes show."""
-SLIP_SHARE: Final = 0.4
-"""With fewer of the expected echoes than this, the wheels may have slipped: odometry is then trusted less."""
 FAILURES_DOUBTED: Final = 2
 """Failures in succession of a landmark by which it lets the pose be doubted."""
-LANDMARKS_DOUBTED: Final = 2
-"""So many such landmarks at once let the pose be doubted."""
 RENEWED_SHARE: Final = 0.7
 """Share of the expected echoes that is assumed after a displacement was found."""
 FAILING_M: Final = 0.01
@@ -196,7 +194,7 @@ class LandmarkTracker:
     @property
     def is_doubtful(self) -> bool:
         """Whether several landmarks fail at once, or hardly any echo comes: rather a robot that slipped."""
-        return bool(np.count_nonzero(self._failing()) >= LANDMARKS_DOUBTED or self.e[0].fit_share < SLIP_SHARE)
+        return bool(np.count_nonzero(self._failing()) >= LANDMARKS_MIN or self.e[0].fit_share < SLIP_SHARE)
 
     def _failing(self) -> NDArray[np.bool_]:
         """Return which landmarks have failed so often that they, or the pose, are doubted."""

@@ -35,8 +35,9 @@ TURN_SHARE: Final = 0.02
 """Standard deviation of a turn by odometry as a share of it."""
 TURN_WALK: Final = 0.0005
 """Variance of a turn by odometry beyond that, rad²/rad: an error of scale adds up over many turns to one side."""
-SHARE_TEMPER: Final = 0.5
-"""Weight of log evidence between hypotheses: places that look alike differ by what is common to many readings."""
+TEMPER: Final = 0.5
+"""Weight of a reading, in the likelihood and in the fit of the place, and of log evidence between hypotheses: errors
+of the map are common to readings of one wall, and what places that look alike differ by to many readings."""
 RESAMPLE_SHARE: Final = 0.5
 """Particles are resampled where fewer than this share of them carry the weight."""
 MERGE_M: Final = 0.3
@@ -343,7 +344,7 @@ def conclude(of: HypothesesRecord, least_log: float, most: int, scratch: Records
     middle = of[0].hypotheses[h]
     for k in range(of[0].count):
         other = of[0].hypotheses[k]
-        odds = math.exp(SHARE_TEMPER * (other.log_evidence - middle.log_evidence))
+        odds = math.exp(TEMPER * (other.log_evidence - middle.log_evidence))
         turn = (other.heading - middle.heading + math.pi) % (2.0 * math.pi) - math.pi
         total += odds
         if math.hypot(other.x - middle.x, other.y - middle.y) <= SAME_PLACE_M and abs(turn) <= SAME_PLACE_RAD:

@@ -14,6 +14,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from perception.kernel import Floats, kernel
+from perception.localization.room.range_likelihood import OUTLIERS
+from perception.localization.submaps.line_pairs import POSE_ROUNDS
 from perception.localization.submaps.local_grid import (
     ECHO_MAX_M,
     HALF_CELLS,
@@ -27,8 +29,6 @@ MATCH_RAYS: Final = 7
 ANSWERS: Final = 0.2
 """Share of a cell's probability with which one ray is answered. With more, beams end before the surface: drives with
 known poses were matched 5 cm short with 0.6, without a bias with 0.2, where their readings also are likeliest."""
-MATCH_OUTLIERS: Final = 0.1
-"""Share of the readings that come from nothing in the map."""
 MATCH_NOISE_M: Final = 0.08
 """Noise of a range in cells of 0.1 m."""
 BEAM_CELLS: Final = 50
@@ -56,8 +56,6 @@ SEARCH_READINGS: Final = 80
 """Readings of a search."""
 FIT_READINGS: Final = 250
 """Readings of the match that follows a search."""
-NEWTON_STEPS: Final = 4
-"""Newton steps of that match."""
 _AXES: Final = np.eye(3)
 
 
@@ -128,11 +126,11 @@ def fit_of(
                 density += passes * (1.0 - goes_on[n]) * math.exp(-0.5 * (off / MATCH_NOISE_M) ** 2)
             passes *= goes_on[n]
         if is_silent:
-            likelihood = (1.0 - MATCH_OUTLIERS) * passes + 0.5 * MATCH_OUTLIERS
+            likelihood = (1.0 - OUTLIERS) * passes + 0.5 * OUTLIERS
         else:
-            likelihood = (1.0 - MATCH_OUTLIERS) * density / (
+            likelihood = (1.0 - OUTLIERS) * density / (
                 MATCH_NOISE_M * math.sqrt(2.0 * math.pi)
-            ) + MATCH_OUTLIERS / ECHO_MAX_M
+            ) + OUTLIERS / ECHO_MAX_M
         total += known * (math.log(likelihood) - usual)
         weight += known
     fit[0], fit[1] = step * total, step * weight
@@ -230,7 +228,7 @@ def best_match(
         return MATCH_TEMPER * float(fit[0])
 
     at = best[:3].copy()
-    for _ in range(NEWTON_STEPS):
+    for _ in range(POSE_ROUNDS):
         here, slope = log_density(at), np.zeros(3)
         plus, minus, curvature = np.zeros(3), np.zeros(3), np.zeros((3, 3))
         for i in range(3):

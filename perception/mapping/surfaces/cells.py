@@ -17,11 +17,11 @@ from typing import Final
 
 from perception.kernel import kernel
 from perception.mapping.surfaces.parameters import (
+    AGREES_M,
     ANSWER_MIN,
     CELL_M,
     CELLS,
     DIRECTIONS,
-    NEARER_M,
     OUTLIER,
     OWN_HITS_MIN,
     PRIOR_READINGS,
@@ -105,7 +105,7 @@ def enter_passes(cells: CellCounts, q: KeptReading, half: float, sign: int) -> N
     """
     x, y, axis = q.x, q.y, q.axis
     size, a_m = 2.0 * CELL_M, 0.5 * CELLS_A_M
-    far = q.range_m - NEARER_M if q.range_m <= REACH_M else SILENCE_M
+    far = q.range_m - AGREES_M if q.range_m <= REACH_M else SILENCE_M
     if not size < far:
         return
     ux, uy = math.cos(axis), math.sin(axis)

@@ -26,7 +26,6 @@ from perception.mapping.surfaces.parameters import (
     PIECE_MIN_M,
     STRENGTH_MIN,
     SURFACE_CELLS_MAX,
-    TAKEN_M,
     WEAK_MIN,
     WHOLE,
 )
@@ -317,7 +316,7 @@ def take(room: LocalMap, counts: CellCounts, number: int) -> None:
     for step in range(steps + 1):
         along = piece.low + step * STEP_M
         for k in range(-OFFSETS, OFFSETS + 1):
-            off = k * TAKEN_M / OFFSETS
+            off = k * OFF_LINE_M / OFFSETS
             i = cell_of(piece.x + along * piece.ux - off * piece.uy)
             j = cell_of(piece.y + along * piece.uy + off * piece.ux)
             if i < 0 or j < 0 or counts.index[i, j] == 0:

@@ -8,12 +8,11 @@ from typing import Final
 from perception.kernel import kernel
 from perception.mapping.surfaces.cells import LEAST_READINGS, direction_strength, hits_around, passes_of_heard
 from perception.mapping.surfaces.parameters import (
+    AGREES_M,
     CELL_M,
     CELLS,
     DIRECTIONS,
-    LINK_M,
     NODE_CELLS,
-    NODE_M,
     NODE_STRENGTH,
     PIECE_KEPT_M,
     POINT_ECHO_NAT,
@@ -21,14 +20,14 @@ from perception.mapping.surfaces.parameters import (
 from perception.mapping.surfaces.pieces import offset_of
 from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCounts, LocalMap, SurfaceCell
 
-APART: Final = round(NODE_M / CELL_M)
-LINKED: Final = round(LINK_M / CELL_M)
+APART: Final = round(AGREES_M / CELL_M)
+LINKED: Final = 2 * APART
 """Cells between two points of a polyline, at least and at most."""
 
 
 @kernel
 def choose_nodes(room: LocalMap, counts: CellCounts, begin: int, end: int) -> None:
-    """Make the strongest cells that are left, at least `NODE_M` apart, points of polylines, where echoes agree.
+    """Make the strongest cells that are left, at least `AGREES_M` apart, points of polylines, where echoes agree.
 
     Parameters
     ----------

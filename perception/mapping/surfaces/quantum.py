@@ -10,16 +10,7 @@ from typing import Final
 
 from perception.kernel import Floats, kernel
 from perception.mapping.surfaces.cells import clear_cells, enter_readings, share_again
-from perception.mapping.surfaces.parameters import (
-    CELLS,
-    LAST_REVISITS,
-    LEFT_M,
-    LEFT_MAX_M,
-    READINGS_MAX,
-    REVISITS,
-    SPACING_M,
-    SPACING_RAD,
-)
+from perception.mapping.surfaces.parameters import CELLS, LEFT_M, LEFT_MAX_M, READINGS_MAX, REVISITS, SPACING
 from perception.mapping.surfaces.piece_fit import group_echoes, judge, place_echoes
 from perception.mapping.surfaces.pieces import ROW_PARTS, capture, grow_all, order_cells
 from perception.mapping.surfaces.polylines import chain_all, choose_nodes
@@ -81,7 +72,7 @@ def keep(rooms: Records[LocalMap], mounts: Floats, pose: Floats, ranges: Floats,
         if room.is_kept[k] == 1:
             moved = math.hypot(x - room.kept_x[k], y - room.kept_y[k])
             turned = axis - room.kept_axis[k]
-            if moved < SPACING_M and 2.0 * abs(math.sin(0.5 * turned)) < SPACING_RAD:
+            if moved < SPACING and 2.0 * abs(math.sin(0.5 * turned)) < SPACING:
                 continue
         room.is_kept[k] = 1
         room.kept_x[k], room.kept_y[k], room.kept_axis[k] = x, y, axis
@@ -113,7 +104,7 @@ def leave(rooms: Records[LocalMap]) -> None:
     room = rooms[0]
     if room.is_left == 0:
         room.is_left = 1
-        room.owed += LAST_REVISITS * room.count
+        room.owed += REVISITS * room.count
 
 
 @kernel

@@ -13,14 +13,13 @@ from perception.ring_faults.changes import (
     EXCHANGED,
     LENGTHENED,
     NO_CHANGE,
-    ROUND_M,
     Expected,
     density,
     expect,
     source,
     weigh_changes,
-)  # fmt: skip
-from perception.ring_faults.memory import EchoTrace, mark
+)
+from perception.ring_faults.memory import LEADS_M, EchoTrace, mark
 from perception.shared_numbers import NO_RANGE
 
 COUNT = 16
@@ -121,7 +120,7 @@ def test_a_robot_that_turns_fast_among_mirrors_hears_other_surfaces_at_once() ->
 
 
 def test_what_was_heard_too_long_ago_or_not_twice_says_nothing() -> None:
-    far = looks(ROOM, ROOM + 1.0, ROUND_M + 0.01)
+    far = looks(ROOM, ROOM + 1.0, LEADS_M + 0.01)
     assert weighed(far) == (NO_CHANGE, 0.0)
     once = looks(ROOM, ROOM + 1.0)
     for k in range(COUNT):

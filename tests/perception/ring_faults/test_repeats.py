@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from perception.records import Records, records, zeros
-from perception.ring_faults.memory import EVIDENCE_NAT, EchoTrace, RingTrace, mark
+from perception.ring_faults.memory import EVIDENCE_NAT, HUNDREDFOLD_NAT, EchoTrace, RingTrace, mark
 from perception.ring_faults.repeats import (
     EQUAL_NAT,
     EQUAL_PRIOR,
     NOISY_NAT,
-    REPEAT_NAT,
     REPEATS_MAX,
     SENSOR_NAT,
     STEP_MIN_M,
@@ -130,9 +129,9 @@ def test_a_change_ahead_ends_the_evidence_and_one_behind_only_its_own() -> None:
         fire(0, 2.0, x)
         fire(12, 3.0, x)
         fire(6, NO_RANGE, x)
-    assert ring[0].repeated_nat == pytest.approx(2.0 * REPEAT_NAT)
+    assert ring[0].repeated_nat == pytest.approx(2.0 * HUNDREDFOLD_NAT)
     fire(12, 3.1, 0.08)
-    assert ring[0].repeated_nat == pytest.approx(REPEAT_NAT)
+    assert ring[0].repeated_nat == pytest.approx(HUNDREDFOLD_NAT)
     fire(0, 1.9, 0.08)
     assert ring[0].repeated_nat == 0.0
 
@@ -155,7 +154,7 @@ def test_walls_along_the_path_do_not_explain_readings_without_noise_besides_one_
             echoes[i].agreed_m, echoes[i].agreed_path_m = r, x
             weigh_repeat(i, (r, x, 0.0, axis), 0.0, i != 12, MOUNTS, RECEPTION, echoes, ring)
     equal = -math.log(EQUAL_PRIOR)
-    assert all_of.repeated_nat == pytest.approx(is_due * REPEATS_MAX * REPEAT_NAT)
+    assert all_of.repeated_nat == pytest.approx(is_due * REPEATS_MAX * HUNDREDFOLD_NAT)
     assert repeat_evidence(all_of) == pytest.approx(all_of.repeated_nat + equal, abs=0.1)
     assert (repeat_evidence(all_of) > EVIDENCE_NAT) is is_due
 

@@ -8,8 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
+from perception.ring_faults.memory import LOOK_FIELDS
 from perception.ring_faults.motion_tests import REPLAY_NAT
-from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS, PastLooks, weigh_replay
+from perception.ring_faults.replays import PAST_LOOKS, PastLooks, weigh_replay
 from perception.shared_numbers import NO_RANGE
 
 SENSORS = 8
@@ -21,7 +22,7 @@ class Ring:
     """What is remembered of a ring, and the greatest evidence so far."""
 
     def __init__(self) -> None:
-        self.past = np.zeros((SENSORS, PAST_LOOKS, PAST_FIELDS))
+        self.past = np.zeros((SENSORS, PAST_LOOKS, LOOK_FIELDS))
         self.looks, self.nats = np.zeros(SENSORS, np.int64), np.zeros(PAST_LOOKS)
         self.before = np.full(SENSORS, NO_RANGE)
         self.most = 0.0
