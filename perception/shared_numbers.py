@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 FAR: Final = 1e6
-"""A range of this much or more (m) means no echo."""
+"""A range of this much or more (m) means no echo; no robot drives so far."""
 NO_RANGE: Final = -1.0
 """In place of a range (m) that a sensor does not have: recordings hold numbers."""
 ROUNDING: Final = 1e-9
@@ -31,3 +31,22 @@ READING_M: Final = 0.1
 """Readings of one sensor from poses nearer than this, in heading than `READING_RAD`, have the same error."""
 READING_RAD: Final = math.radians(6.0)
 """Difference of headings in `READING_M`."""
+PASSED_M: Final = 0.3
+"""A range that is longer than to a surface by this (m) has passed it."""
+SILENCE_M: Final = 2.5
+"""Way that silence shows to be clear, m: mirrors are silent, too."""
+OUTLIER: Final = 0.005
+"""Weight of an echo from nowhere, beside the probabilities to answer of the places on its arc."""
+LEAST_READINGS: Final = 0.5
+"""Readings that every cell has without having been looked at."""
+ODOMETER_SIGMA: Final = 0.03
+"""Standard deviation of the odometer's scale at the start."""
+SPACING: Final = 0.02
+"""A sensor that moved (m) and turned (rad) by less than this says the same again."""
+BLOCK: Final = 16
+"""Cells along the edge of a block of a grid."""
+BEYOND_ALL: Final = 1e9
+"""In place of a range (m), misfit, priority or evidence (nat) that is not known, as it is greater than all of
+them."""
+TINY: Final = 1e-200
+"""Least divisor, and least number of which a logarithm is taken: an impossible value gives a number, not an error."""

@@ -86,8 +86,6 @@ REASONS: Final = MappingProxyType(
 WIRED: Final = CHANGED + EXCHANGED + 1
 """From here on, a finding is WIRED + i·n + j for sensors i and j of n that are exchanged; for i = j it looks
 backwards, for i = n sensor j is deaf."""
-WIRING_NAT: Final = EVIDENCE_NAT + math.log(0.5 * SENSORS_MAX**2)
-"""Evidence that suffices for one of so many pairs, nat."""
 
 
 def deaf_reason(i: int) -> str:
@@ -198,7 +196,15 @@ class RingMonitor:
             self._expected,
             self._past_looks,
         )
-        wired = weigh_wiring(firing.ranges_m, pose, mounts, reception, self._wiring, self._near, WIRING_NAT)
+        wired = weigh_wiring(
+            firing.ranges_m,
+            pose,
+            mounts,
+            reception,
+            self._wiring,
+            self._near,
+            EVIDENCE_NAT + math.log(0.5 * SENSORS_MAX**2),
+        )
         if wired >= 0 and self.judge_turn():  # all looks together know better which pair it is
             self._found = WIRED + int(wired)
         if found >= STUCK_SENSOR:

@@ -36,8 +36,6 @@ OTHER_RADIUS_SAME_M: Final = 0.015
 """With a smaller deviation a radius is the model's own."""
 OTHER_RADIUS_ERROR_M: Final = 0.04
 """Greatest standard deviation at which a radius is compared; before that the rivals suffice."""
-BIN_RAD: Final = math.tau / BEARING_BINS
-"""Bearing between two bins of a track's reservoir."""
 
 
 @kernel
@@ -143,7 +141,7 @@ def outline_lead(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
             root[b, k] = 0.0
             if there.accuracy == 0.0:
                 continue
-            alike = math.exp((math.cos((b - k) * BIN_RAD) - 1.0) / OUTLINE_SCALE_RAD**2)
+            alike = math.exp((math.cos((b - k) * math.tau / BEARING_BINS) - 1.0) / OUTLINE_SCALE_RAD**2)
             v = OUTLINE_SIGMA_M**2 * alike * here.accuracy * there.accuracy
             for i in range(k):
                 v -= root[b, i] * root[k, i]

@@ -21,8 +21,6 @@ CHANGED_MIN: Final = 3
 10 % one in a thousand series is so long. Each doubling of the looks before them asks for one more."""
 LOOKS_MAX: Final = 8
 """Readings from one place that can be evidence, of what is new there."""
-COUNTED: Final = LOOKS_MAX + 1
-"""Looks with which a sensor arrives at a place, so that its further ones there are no evidence."""
 
 
 @kernel
@@ -99,7 +97,7 @@ def place_readings(
         elif is_near and abs(r - last.range_m) <= half_box:
             continue
         else:
-            sensor.looks = 1 if sensor.looks == 0 else COUNTED
+            sensor.looks = 1 if sensor.looks == 0 else (LOOKS_MAX + 1)
             sensor.changed = 0
         q = scratch.fired[m]
         q.x = x
@@ -108,7 +106,7 @@ def place_readings(
         q.axis_y = uy
         q.range_m = r
         q.listener_x = q.listener_y = 0.0
-        if sensor.looks == 1 or sensor.looks == COUNTED:  # Later ones from there may be strays.
+        if sensor.looks == 1 or sensor.looks == (LOOKS_MAX + 1):  # Later ones from there may be strays.
             copy_reading(q, last)
         if r <= least:  # after the above, or the next range from here would be the first look
             continue

@@ -29,10 +29,7 @@ from perception.bayes.memory.scratch import CircleFit, LineFit, LineScore, Predi
 from perception.bayes.memory.settings_record import Settings
 from perception.kernel import kernel
 from perception.records import Records
-from perception.shared_numbers import FAR
-
-NONE_YET: Final = 1e9
-"""Initial least range and extent (m) of an object without a hit."""
+from perception.shared_numbers import BEYOND_ALL, FAR
 
 NO_INFORMATION: Final = 1e-12
 """Information (in single perfect readings) that a fit starts from, to be regular without echoes."""
@@ -102,7 +99,7 @@ def score_circle(
     near = 0.0
     axis_x = 0.0
     axis_y = 0.0
-    closest = NONE_YET
+    closest = BEYOND_ALL
     predict_circle(readings, cx, cy, radius, predicted)
     for j in range(len(readings)):
         q = readings[j]
@@ -341,8 +338,8 @@ def score_line(
     llr = 0.0
     hits = 0.0
     misses = 0.0
-    low = NONE_YET
-    high = -NONE_YET
+    low = BEYOND_ALL
+    high = -BEYOND_ALL
     if line.rays > 0:
         cos_may = cos_half = cos_must = GRAZING_MIN  # a ray meets a line at any angle
     for j in range(len(readings)):

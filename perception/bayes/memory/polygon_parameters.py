@@ -6,11 +6,9 @@ the name or in the line below; a plain number is a count, a factor or a share.
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 from config.units import FOOT_M
-from perception.bayes.memory.parameters import MAY_ANSWER_DEG
 
 # --- What a polygon answers ----------------------------------------------------------------------------------------
 
@@ -175,8 +173,6 @@ POLYGON_NAMED_HITS_SWEPT: Final = 12.0
 """Least hits of a reported body that many readings fit, in place of `MANY_HITS`."""
 POLYGON_INFLATION: Final = 1.15
 """Factor on a polygon's reported covariance: the noise does not include the influence of its neighbours."""
-POLYGON_TURN_SIGMA_RAD: Final = math.radians(MAY_ANSWER_DEG)
-"""Least standard deviation of its heading: that of the beam's edges, since an echo at an edge turns a body."""
 
 # --- Effort --------------------------------------------------------------------------------------------------------
 

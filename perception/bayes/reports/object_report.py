@@ -14,13 +14,14 @@ from perception.bayes.memory.parameters import (
     CIRCLE_INFLATION,
     GATE_M,
     LINE_JOIN_M,
+    MAY_ANSWER_DEG,
     PLACED_SIGMA_M,
     ROOM_MARGIN_M,
     UNKNOWN_HITS_MIN,
     WALL_ECHOES_MIN,
     WALL_LENGTH_MIN_M,
 )
-from perception.bayes.memory.polygon_parameters import EDGE_REACH_M, POLYGON_INFLATION, POLYGON_TURN_SIGMA_RAD
+from perception.bayes.memory.polygon_parameters import EDGE_REACH_M, POLYGON_INFLATION
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, Memory, PolygonTrack
 from perception.bayes.reports.claimed_echoes import own_echoes
@@ -89,7 +90,7 @@ def polygon_covariance(track: PolygonTrack) -> Floats:
     covariance[np.tril_indices(3)] = POLYGON_INFLATION * np.array(
         [held.xx, held.yx, held.yy, held.hx, held.hy, held.hh]
     )
-    covariance[2, 2] += POLYGON_TURN_SIGMA_RAD**2
+    covariance[2, 2] += math.radians(MAY_ANSWER_DEG) ** 2
     return covariance + np.tril(covariance, -1).T
 
 

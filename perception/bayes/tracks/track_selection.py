@@ -9,7 +9,6 @@ so that none waits for more than `PASSED_OVER_MAX` quanta and one for each other
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from perception.bayes.memory.elements import MAX_POLYGONS
 from perception.bayes.memory.parameters import (
@@ -22,10 +21,7 @@ from perception.bayes.memory.parameters import (
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import FREE, AnyTrack, CircleTrack, CircleTracks, StateRecord
 from perception.kernel import kernel
-from perception.shared_numbers import CERTAIN_PROBABILITY
-
-OVERDUE: Final = 1e9
-"""Priority of a track that was passed over more than `PASSED_OVER_MAX` times."""
+from perception.shared_numbers import BEYOND_ALL, CERTAIN_PROBABILITY
 
 
 @kernel
@@ -86,7 +82,7 @@ def priority(s: StateRecord, p: SettingsRecord, value: float, track: CircleTrack
         The circle.
     """
     if track.passed_over > PASSED_OVER_MAX:
-        return OVERDUE + track.passed_over
+        return BEYOND_ALL + track.passed_over
     return value * p[0].range_max_m / (p[0].range_max_m + math.hypot(track.x - s[0].ring_x, track.y - s[0].ring_y))
 
 
@@ -155,7 +151,7 @@ def choose_polygon(s: StateRecord, p: SettingsRecord, threshold: float) -> int:
         if track.status != FREE:
             v = unseen_evidence(track, p[0].idle_firings, threshold, 1.0)
         if v > threshold:
-            v = OVERDUE + track.passed_over if track.passed_over > PASSED_OVER_MAX else v
+            v = BEYOND_ALL + track.passed_over if track.passed_over > PASSED_OVER_MAX else v
             track.passed_over += 1
             if v > best:
                 best = v

@@ -15,6 +15,7 @@ from perception.bayes.memory.wall_records import Wall
 from perception.bayes.walls.bins import is_covered, mean_error, middle_of
 from perception.bayes.walls.contact import wall_normal, wall_point
 from perception.kernel import kernel
+from perception.shared_numbers import BEYOND_ALL
 
 BARREL_RADIUS_M: Final = 0.7
 """Radius of the largest barrel: a wall must explain its echoes better than such a round object."""
@@ -32,8 +33,6 @@ OUT_OF_BEAM_CHI2: Final = 4.0
 """Evidence of an echo whose beam does not contain the round object's centre."""
 FLAT_BINS_MIN: Final = 4
 """With fewer bins a curve does not stand out from noise."""
-MISFIT_UNKNOWN: Final = 1e9
-"""The misfit of fewer bins."""
 LINE_MISFIT_MAX: Final = 2.5
 """Greatest χ² of the line of a new wall, and of a reported one, for each degree of freedom."""
 SPAN_CHI2_MIN: Final = -2.0
@@ -169,7 +168,7 @@ def flatness(wall: Wall, first: int, end: int, p: SettingsRecord) -> tuple[float
     """
     line, n = line_chi2(wall, first, end)
     if n < FLAT_BINS_MIN:
-        return 0.0, MISFIT_UNKNOWN
+        return 0.0, BEYOND_ALL
     circle = circle_chi2(wall, first, end, BARREL_RADIUS_M, p, line + EXACT_BELOW_CHI2)
     if circle < line + EXACT_BELOW_CHI2:
         circle = min(circle, circle_chi2(wall, first, end, DRUM_RADIUS_M, p, math.inf))

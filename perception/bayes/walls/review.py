@@ -45,7 +45,8 @@ from perception.kernel import Floats, kernel
 from perception.shared_numbers import FAR, LIKELY
 
 RECENT_SPACING_M: Final = 0.08
-"""Least distance between the recent readings of a sensor that nothing explains, and between the remembered ones."""
+"""Least distance between the recent readings of a sensor that nothing explains, and between the remembered ones;
+three times as much between recent ones that something explains."""
 REMEMBERED_FIRST: Final = 1024
 """So many are remembered, those of some 3 m, before a wall is known and whether slanting walls answer, or are
 mirrors: then readings show corners and edges. Where no wall stands, more of them would only fill recordings."""

@@ -24,7 +24,6 @@ from perception.bayes.walls.report import sure_room
 from perception.kernel import kernel
 from perception.sensor_mounts import RingPose
 
-STANDING_RAD: Final = math.acos(STILL_COS)
 STOPPED: Final = 0.001
 """A robot that moved (m) and turned (rad) by less than this between two firings has stopped: bases
 count their way in millimetres. Later it stands while its sensors are where they were, as `placement` has it."""
@@ -62,7 +61,7 @@ def has_just_stopped(s: StateRecord, pose: RingPose) -> bool:
     stop = room.stop
     moved, turned = math.hypot(x - stop.x, y - stop.y), abs(wrapped(yaw - stop.yaw))
     is_standing = stop.is_standing == 1
-    most_m, most_rad = (SYSTEMATIC_M, STANDING_RAD) if is_standing else (STOPPED, STOPPED)
+    most_m, most_rad = (SYSTEMATIC_M, math.acos(STILL_COS)) if is_standing else (STOPPED, STOPPED)
     if moved <= most_m and turned <= most_rad:
         stop.is_standing = 1
         return not is_standing

@@ -15,6 +15,7 @@ from perception.bayes.memory.wall_records import IS_FREE, RecentReading, Wall, W
 from perception.bayes.walls.bins import SILENT_PASS
 from perception.bayes.walls.contact import HEARD_REACH_M, SAME_SIGMAS, SLANTING_MIN_COS, edges_answer
 from perception.kernel import kernel, loop_kernel
+from perception.shared_numbers import PASSED_M
 
 SCORE_LEVER: Final = 0.03
 """Further error of a range that supports a candidate, beyond `SAME_SIGMAS`, for each metre along it: its direction is
@@ -23,8 +24,6 @@ SCORE_LEVER_MAX_M: Final = 1.5
 """That error grows no more beyond this distance along the candidate."""
 SCORE_EDGE: Final = 0.6
 """Weight of an echo from the beam's edge."""
-PASS_M: Final = 0.3
-"""A range this much longer than to a candidate passed through it."""
 PASS_WITHIN_M: Final = 0.5
 """A range that passed through counts where it touches the candidate this near the echo."""
 
@@ -82,7 +81,7 @@ def weigh(
         slack = SAME_SIGMAS * math.sqrt(variance_m2 + relative * expected * expected)
         slack += SCORE_LEVER * min(away, SCORE_LEVER_MAX_M) / base
         is_near = abs(e) < slack
-        passed = (e > PASS_M) & (away < PASS_WITHIN_M) & is_foot & (dot >= must)
+        passed = (e > PASSED_M) & (away < PASS_WITHIN_M) & is_foot & (dot >= must)
         for_it = near.is_free[j] * (1.0 if is_foot else SCORE_EDGE)
         against = SILENT_PASS if passed else 0.0
         weight = for_it if is_near else -against

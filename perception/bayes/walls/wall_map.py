@@ -63,14 +63,9 @@ from perception.bayes.walls.review import RECENT_SPACING_M, remember, review
 from perception.kernel import kernel
 from perception.shared_numbers import FAR
 
-KNOWN_SPACING_M: Final = 0.24
-"""Least distance between the recent readings of a sensor that something explains; see `RECENT_SPACING_M`."""
-FIT_FIRINGS: Final = 2
-"""Each wall is fitted again at every second firing."""
-TIDY_FIRINGS: Final = 8
-"""Firings between two passes over pairs of walls, and between two looks for what is heard on a wall's line."""
 REVIEW_FIRINGS: Final = 4
-"""Firings between two reviews of a wall: a tenth of a millisecond each."""
+"""Firings between two reviews of a wall, a tenth of a millisecond each. In half as many each wall is fitted again; in
+twice as many there is a pass over pairs of walls, and a look for what is heard on a wall's line."""
 BEAM_WALL_WEIGHT_MIN: Final = 40.0
 """Walls of this weight show whether slanting walls answer from the beam's edge."""
 EDGE_WITHIN_M: Final = 0.15
@@ -179,7 +174,7 @@ def keep_recent(room: WallMap, sensor: int, q: Reading, is_free: int) -> int:
         As in `RecentReading`.
     """
     is_first = room.kept[sensor] == 0.0
-    spacing = RECENT_SPACING_M if is_free == IS_FREE else KNOWN_SPACING_M
+    spacing = RECENT_SPACING_M if is_free == IS_FREE else 3.0 * RECENT_SPACING_M
     if not is_first and math.hypot(q.x - room.kept_x[sensor], q.y - room.kept_y[sensor]) <= spacing:
         return -1
     room.kept[sensor] = 1.0
@@ -280,16 +275,16 @@ def update_walls(memory: Memory, p: SettingsRecord, m: int) -> None:
     """Update the walls by the `m` readings of the firing that `observe` has processed."""
     newest = enter_firing(memory.s, memory.tracks, p, m)
     firings: int = memory.firings.item()
-    fit_walls(memory.s, p, firings % FIT_FIRINGS, MAX_WALLS, FIT_FIRINGS)
+    fit_walls(memory.s, p, firings % REVIEW_FIRINGS // 2, MAX_WALLS, REVIEW_FIRINGS // 2)
     is_new = newest >= 0 and try_wall(memory, p, newest)
-    turn, phase = divmod(firings, TIDY_FIRINGS)
+    turn, phase = divmod(firings, 2 * REVIEW_FIRINGS)
     if phase == 0 or is_new:
         merge_walls(memory, p)
-    if phase == TIDY_FIRINGS // 3:
+    if phase == 2 * REVIEW_FIRINGS // 3:
         drop_explained(memory.s, memory.tracks, p, turn)
-    elif phase == TIDY_FIRINGS * 2 // 3:
+    elif phase == 2 * REVIEW_FIRINGS * 2 // 3:
         find_corners(memory.s)
-    elif phase == TIDY_FIRINGS - 1:
+    elif phase == 2 * REVIEW_FIRINGS - 1:
         find_heard_points(memory, p, turn)
     if phase % REVIEW_FIRINGS == 1:
         review(memory.s, memory.tracks, p, firings // REVIEW_FIRINGS)

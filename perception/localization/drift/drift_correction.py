@@ -51,8 +51,6 @@ FIRST_LANDMARKS: Final = 3
 """The filter begins with so many landmarks."""
 FIRST_WAY_M: Final = 2.5
 """After this way the filter begins with one landmark."""
-LONGEST_WAY_M: Final = 5.0
-"""After this way the filter begins without a landmark."""
 WAITING_MAX: Final = 240
 """Firings that can wait."""
 CYCLE_FIRINGS: Final = 3
@@ -164,7 +162,7 @@ class DriftCorrection:
             most = way * MOTION_PER_M
             self._motion += np.maximum(np.minimum(self._map_heading.motion - self._motion, most), -most)
         self._arrived += 1
-        self._has_started = self._has_started or self._way_m > LONGEST_WAY_M
+        self._has_started = self._has_started or self._way_m > 2.0 * FIRST_WAY_M
         self._map_heading.keep(row)
         if self._has_started:
             for _ in range(min(ENTERED_AT_ONCE, self._arrived - self._tracker.entered)):

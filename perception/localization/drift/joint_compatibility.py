@@ -33,8 +33,6 @@ PAIR_GATE: Final = 9.2
 """χ² of two degrees of freedom that a true pair exceeds in one of a hundred cases."""
 JOINT_GATE: Final = (0.0, 9.2, 13.3, 16.8, 20.1, 23.2, 26.2, 29.1, 32.0, 34.8, 37.6, 40.3, 43.0)
 """The same of two degrees of freedom for each pair; the index is the number of pairs."""
-PAIRED_ECHOES_MAX: Final = len(JOINT_GATE) - 1
-"""Echoes that are paired at most: `JOINT_GATE` has no more values."""
 PAIRS_MIN: Final = 4
 """A pairing of fewer echoes than this is none."""
 PAIRED_SHARE: Final = 0.6
@@ -98,7 +96,7 @@ def find_displacement(echoes: Sequence[Echo], discs: Sequence[Disc], half_angle:
     Parameters
     ----------
     echoes : sequence of Echo
-        Of one cycle of the ring; the nearest `PAIRED_ECHOES_MAX` are used.
+        Of one cycle of the ring; the nearest are used, as many as `JOINT_GATE` has values for.
     discs : sequence of Disc
         The landmarks.
     half_angle : float
@@ -159,7 +157,7 @@ def share_improved(found: Displacement, echoes: Sequence[Echo], discs: Sequence[
 
 
 def _nearest(echoes: Sequence[Echo]) -> list[Echo]:
-    return sorted(echoes, key=lambda echo: echo.range_m)[:PAIRED_ECHOES_MAX]
+    return sorted(echoes, key=lambda echo: echo.range_m)[: len(JOINT_GATE) - 1]
 
 
 def _squared(pose: Pose, echo: Echo, disc: Disc, half_angle: float) -> float:

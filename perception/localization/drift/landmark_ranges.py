@@ -28,15 +28,12 @@ from perception.localization.drift.landmark_state import (
     SonarModel,
 )
 from perception.sensor_mounts import RingPose, SensorPose
-from perception.shared_numbers import NO_RANGE, OUTLIER_SIGMAS
+from perception.shared_numbers import NO_RANGE, OUTLIER_SIGMAS, PASSED_M, SPACING
 
 SOFT: Final = 6.25
 """Normalised squared innovation from which on a reading's weight is reduced: its tails are heavier than a bell's."""
 NEAR_M: Final = 0.5
 """A range this near to a landmark's, but outside the gate, is a failure of that landmark."""
-FRESH_M: Final = 0.02
-"""A sensor's readings from poses nearer than this, and turned by less than `MARGIN_RAD`, repeat one error of
-rounding; only the first is used."""
 NOISE_MEMORY: Final = 0.005
 """Share of one reading in the estimate of the noise."""
 NOISE_MIN: Final = 0.02
@@ -56,14 +53,12 @@ WILD_PER_M: Final = 0.01
 """Share of the readings that are of something else, for each metre of range: as many fit a landmark by chance."""
 CURVATURE_MIN: Final = 1e-6
 """With less, as a share of the squared slope, nothing would change."""
-PASSED_M: Final = 0.3
-"""A range this much beyond a landmark's has passed it."""
 
 
 @kernel
 def has_moved_since(last: LastUse, x: float, y: float, axis: float) -> bool:
     """Return whether a sensor at (x, y) (m), axis (rad), has moved or turned enough since its last reading."""
-    return last.is_known == 0 or abs(axis - last.axis) >= MARGIN_RAD or math.hypot(x - last.x, y - last.y) >= FRESH_M
+    return last.is_known == 0 or abs(axis - last.axis) >= MARGIN_RAD or math.hypot(x - last.x, y - last.y) >= SPACING
 
 
 @kernel

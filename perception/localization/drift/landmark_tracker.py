@@ -31,11 +31,9 @@ from perception.localization.drift.landmark_state import (
 from perception.localization.drift.walk_rates import WalkRates
 from perception.records import records, zeros
 from perception.sensor_mounts import RingPose, mounts_array, turned_mounts
-from perception.shared_numbers import ROUNDING
+from perception.shared_numbers import ODOMETER_SIGMA, ROUNDING
 
 OFFSET_SIGMA_RAD: Final = math.radians(0.5)
-ODOMETER_SIGMA: Final = 0.03
-"""Standard deviation of the odometer's scale at the start."""
 TURN_SIGMA: Final = 0.01
 """Standard deviation of the scale of turns, and of that of ranges, at the start."""
 HEADING_RATES: Final = (math.radians(0.1) * 2.0 ** (0.5 * np.arange(12.0))) ** 2

@@ -24,6 +24,7 @@ from perception.localization.known_room.surroundings import Surroundings, expect
 from perception.localization.room.range_likelihood import HEARD_PRIOR
 from perception.localization.room.room import Room
 from perception.records import Record, Records, records, zeros
+from perception.shared_numbers import BLOCK
 
 GRID_CELL_M: Final = 0.2
 """Edge of a cell of the grid of places."""
@@ -35,8 +36,6 @@ OPEN_M: Final = 3.0
 """The grid reaches so far beyond the surfaces of a room without walls."""
 CELLS_PER_QUANTUM: Final = 4
 """Cells of the table that one quantum computes."""
-BLOCK: Final = 16
-"""Cells of a block's side: a quantum of a search compares one block at one heading."""
 GRID_READINGS_MAX: Final = 108
 """Readings that are compared."""
 SIGMA_M: Final = 0.12

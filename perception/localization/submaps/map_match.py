@@ -16,13 +16,8 @@ import numpy as np
 from perception.kernel import Floats, kernel
 from perception.localization.room.range_likelihood import OUTLIERS
 from perception.localization.submaps.line_pairs import POSE_ROUNDS
-from perception.localization.submaps.local_grid import (
-    ECHO_MAX_M,
-    HALF_CELLS,
-    SILENT_CLEAR_M,
-    SUBMAP_CELL_M,
-    SUBMAP_CELLS,
-)
+from perception.localization.submaps.local_grid import ECHO_MAX_M, HALF_CELLS, SUBMAP_CELL_M, SUBMAP_CELLS
+from perception.shared_numbers import SILENCE_M
 
 MATCH_RAYS: Final = 7
 """Rays of a beam along which the map is asked."""
@@ -40,8 +35,6 @@ MATCH_TEMPER: Final = 0.1
 real drives deviate as they say (the median of their squared errors over their covariance is 1 to 2 for 3 degrees)."""
 POSE_STEP: Final = np.array([0.08, 0.08, 0.03])
 """Differences of place (m) and direction (rad) by which the likelihood's slope and curvature are taken."""
-STEP_MOVE_MAX_M: Final = 0.15
-"""The most by which one step shifts a match."""
 STEP_TURN_MAX_RAD: Final = 0.06
 """The most by which one step turns a match."""
 INFORMATION_MIN: Final = 1.0
@@ -99,7 +92,7 @@ def fit_of(
         axis = at[2] + readings[k, 2]
         is_silent = range_m > ECHO_MAX_M
         last = BEAM_CELLS if is_silent else min(BEAM_CELLS, int(range_m / SUBMAP_CELL_M) + 3)
-        end = int((SILENT_CLEAR_M if is_silent else range_m) / SUBMAP_CELL_M)
+        end = int((SILENCE_M if is_silent else range_m) / SUBMAP_CELL_M)
         known = 0.0
         for n in range(last):
             goes_on[n] = 1.0
@@ -247,7 +240,7 @@ def best_match(
         move = axes @ ((axes.T @ slope) / values)
         share = min(
             1.0,
-            STEP_MOVE_MAX_M / max(1e-9, math.hypot(move[0], move[1])),
+            SEARCH_STEP_M / max(1e-9, math.hypot(move[0], move[1])),
             STEP_TURN_MAX_RAD / max(1e-9, abs(move[2])),
         )
         at = at + share * move

@@ -30,8 +30,6 @@ CERTAIN: Final = 3 * NAT
 """Greatest evidence for and against, so that contradiction is soon seen."""
 NO_PLACE_NUMBER: Final = 0
 """The place of evidence that was never renewed; no place has this number."""
-BEYOND_M: Final = 0.3
-"""An echo from this far behind what should have answered passed over it."""
 SURE: Final = NAT // 2
 """A cell of so much evidence answers."""
 FAINT: Final = int(0.1 * NAT)

@@ -27,7 +27,6 @@ from drivers.messages import Firing
 from perception.bounds import Bound, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
 from perception.mapping.grid.cell_evidence import (
-    BEYOND_M,
     CERTAIN,
     NAT,
     PASSAGE,
@@ -57,6 +56,7 @@ from perception.mapping.grid.window import (
     rows_within,
     set_edges,
 )
+from perception.shared_numbers import PASSED_M
 
 DIRECTED_ARC_SIGMAS: Final = 1.5
 """Half the thickness of an echo's arc in a looking direction."""
@@ -274,7 +274,7 @@ def enter_readings(
         if nearest < math.inf:
             if is_echo and abs(r - nearest) <= 2.0 * sigma + cell_m:
                 answers[0] += 1.0
-            elif nearest < passed - BEYOND_M:
+            elif nearest < passed - PASSED_M:
                 answers[1] += 1.0
     enter_hits(planes, maybe_sure, place, DIRECTED_UNIT + MIRRORS_UNIT * mirrors, arc[:m], shares, draws)
 

@@ -22,23 +22,21 @@ from perception.mapping.surfaces.parameters import (
     CELL_M,
     CELLS,
     DIRECTIONS,
-    OUTLIER,
     OWN_HITS_MIN,
     PRIOR_READINGS,
     REACH_M,
     SAMPLES,
     SHARE_BITS,
     SHARES_A_WORD,
-    SILENCE_M,
     STRENGTH_SHARE,
     TAIL_CELLS,
     TAIL_SHARE,
     WHOLE,
     WHOLE_PASS,
 )
-from perception.mapping.surfaces.records import BLOCK, RIM, WORDS, CellCounts, KeptReading, LocalMap
+from perception.mapping.surfaces.records import RIM, WORDS, CellCounts, KeptReading, LocalMap
 from perception.records import Records
-from perception.shared_numbers import ROUNDING
+from perception.shared_numbers import BLOCK, LEAST_READINGS, OUTLIER, ROUNDING, SILENCE_M
 
 BLUR: Final = 16.0
 """Sum of the weights 1, 2, 4 with which the hits of 3 × 3 cells are blurred."""
@@ -46,8 +44,6 @@ HITS: Final = 3.0 / (BLUR * WHOLE)
 """A surface of three cells' thickness gets whole echoes, which blurring divides among them."""
 LEAST_HITS: Final = 0.03
 """Hits that every cell has without having been looked at: it answers with 6 %."""
-LEAST_READINGS: Final = 0.5
-"""Readings that every cell has without having been looked at."""
 AXIS_LOSS: Final = 0.5
 """At the beam's edge a pass counts half, less with the square of the angle. An echo is as likely from there as
 from the middle: 42 to 67 % of the drives' echoes are from the outer third, as a slanting surface is nearest there."""

@@ -32,17 +32,11 @@ SHARE_BITS: Final = 7
 """Bits of each share in such a number."""
 WHOLE_PASS: Final = 16
 """A pass along the beam's axis; at the beam's edge it counts half."""
-SILENCE_M: Final = 2.5
-"""Way for which silence counts as a pass."""
 PRIOR_READINGS: Final = 1.0
 """Readings of one direction for which the other directions of a cell stand. Drives: 0.1 to 1 within 1 %."""
-OUTLIER: Final = 0.005
-"""Probability of an echo from nowhere, beside those of the places on its arc."""
 REVISITS: Final = 3
 """Times that an earlier echo is shared again for each new reading, and all before a local map is left. Drives: 2 as
 good, none 2 to 4 % more false."""
-SPACING: Final = 0.02
-"""A sensor that moved (m) and turned (rad) by less than this says the same again."""
 READINGS_MAX: Final = 12288
 """Readings of a local map, at most."""
 
@@ -79,8 +73,6 @@ COVERED_MIN: Final = 0.6
 """Least share of a piece's length with occupied cells."""
 END_STRENGTH: Final = 1.5
 """A piece ends at its outermost cell of this strength. Drives: false length 4.0 to 1.7 % in the office."""
-NODE_CELLS: Final = 2
-"""Cells around a point of a polyline whose echoes it is given: up to 0.1 m away."""
 NODE_STRENGTH: Final = 2.5
 """It has two whole echoes from each of two directions, or as much, and a little more. Drives: with 2.4 polylines
 explain 0.2 % more and 1.2 instead of 0.8 % of them are false, in other buildings 8.1 instead of 7.3 %; with 2.2
@@ -93,6 +85,9 @@ AGREES_M: Final = 0.1
 """Two surfaces within this are one: the distance within which a surface explains an echo. Points of a polyline are at
 least this far apart and at most twice this, as there may be no cell for a point between them; a range passed through
 what is nearer by this (drives: 0.06 and 0.15 lose 1 to 2 % at the same false share)."""
+APART: Final = round(AGREES_M / CELL_M)
+"""Cells between two points of a polyline, at least; at most twice as many. A point is given the echoes of the cells
+this near to it."""
 KNOWN_NAT: Final = 40.0
 """Log odds against a piece as a wall where all that was heard lies along what the method knows, before the piece's
 own evidence."""

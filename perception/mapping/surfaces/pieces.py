@@ -15,13 +15,13 @@ from perception.mapping.surfaces.cells import (
     strength_of,
 )
 from perception.mapping.surfaces.parameters import (
+    APART,
     CELL_M,
     CELLS,
     COVERED_MIN,
     DIRECTIONS,
     END_STRENGTH,
     GAP_M,
-    NODE_CELLS,
     OFF_LINE_M,
     PIECE_MIN_M,
     STRENGTH_MIN,
@@ -29,19 +29,9 @@ from perception.mapping.surfaces.parameters import (
     WEAK_MIN,
     WHOLE,
 )
-from perception.mapping.surfaces.records import (
-    ANGLES,
-    BLOCK,
-    DIGITS,
-    FREE,
-    RIM,
-    CellCounts,
-    LocalMap,
-    Piece,
-    SurfaceCell,
-)
+from perception.mapping.surfaces.records import ANGLES, DIGITS, FREE, RIM, CellCounts, LocalMap, Piece, SurfaceCell
 from perception.records import Records
-from perception.shared_numbers import ROUNDING
+from perception.shared_numbers import BLOCK, ROUNDING
 
 ROW_PARTS: Final = CELLS * CELLS // BLOCK
 """Parts of rows, as long as a block."""
@@ -335,7 +325,7 @@ def take(room: LocalMap, counts: CellCounts, number: int) -> None:
 def count_answers(room: LocalMap, counts: CellCounts, i: int, j: int) -> None:
     """Add a piece's cell to what says how often the surfaces of this map answer to a direction that hears them."""
     for b in range(DIRECTIONS):
-        hits = hits_around(counts, b, i, j, NODE_CELLS)
+        hits = hits_around(counts, b, i, j, APART)
         room.heard += hits / WHOLE
         room.passed += passes_of_heard(counts, b, i, j, hits) / WHOLE
 

@@ -10,13 +10,13 @@ from typing import Final
 
 from perception.kernel import Floats, kernel
 from perception.mapping.surfaces.cells import clear_cells, enter_readings, share_again
-from perception.mapping.surfaces.parameters import CELLS, LEFT_M, LEFT_MAX_M, READINGS_MAX, REVISITS, SPACING
+from perception.mapping.surfaces.parameters import CELLS, LEFT_M, LEFT_MAX_M, READINGS_MAX, REVISITS
 from perception.mapping.surfaces.piece_fit import group_echoes, judge, place_echoes
 from perception.mapping.surfaces.pieces import ROW_PARTS, capture, grow_all, order_cells
 from perception.mapping.surfaces.polylines import chain_all, choose_nodes
-from perception.mapping.surfaces.records import BLOCK, CellCounts, LocalMap
+from perception.mapping.surfaces.records import CellCounts, LocalMap
 from perception.records import Records
-from perception.shared_numbers import FAR
+from perception.shared_numbers import BLOCK, FAR, SPACING
 
 ENTERED: Final = 16
 """Readings that one quantum enters, in a twentieth of a millisecond, as each of those below."""

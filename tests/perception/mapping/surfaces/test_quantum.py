@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from perception.mapping.surfaces import quantum
-from perception.mapping.surfaces.parameters import REVISITS, SPACING
+from perception.mapping.surfaces.parameters import REVISITS
 from perception.mapping.surfaces.records import CellCounts, LocalMap
 from perception.records import records, zeros
-from perception.shared_numbers import FAR
+from perception.shared_numbers import FAR, SPACING
 
 pytestmark = pytest.mark.compiled
 HALF = math.radians(12.0)
