@@ -50,3 +50,7 @@ BEYOND_ALL: Final = 1e9
 them."""
 TINY: Final = 1e-200
 """Least divisor, and least number of which a logarithm is taken: an impossible value gives a number, not an error."""
+NO_INDEX: Final = -1
+"""In place of the index of something where there is none."""
+NO_NUMBER: Final = 0
+"""In place of the number of an object or a place; none has this one."""

@@ -38,10 +38,10 @@ from perception.bayes.memory.parameters import (
     FIRST_FIT_SOFTNESS,
     FIT_SOFTNESS,
     LINE_LENGTH_MIN_M,
+    MODEL_PRIOR_NAT,
     OTHER_FIT_STEPS,
     OUTLINE_CELL_M,
     READINGS_MIN,
-    RIVAL_OVER_UNKNOWN_NAT,
     SWITCH_LEAD_NAT,
 )
 from perception.bayes.memory.settings_record import SettingsRecord
@@ -320,7 +320,7 @@ def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: in
     chosen, best, best_x, best_y = best_circle(s, p, kind, n, (x, y, radius), bearing, own)
     if chosen == kind and llr < p[0].unknown_nat * near:
         return UNSUPPORTED
-    if chosen != kind and best < p[0].unknown_nat * near + RIVAL_OVER_UNKNOWN_NAT:
+    if chosen != kind and best < p[0].unknown_nat * near + MODEL_PRIOR_NAT:
         return UNSUPPORTED
     if is_known(tracks, p, best_x, best_y, -1.0, nx, ny) or is_rejected(s, best_x, best_y, chosen, best):
         return SETTLED

@@ -26,13 +26,12 @@ from perception.bayes.memory.parameters import (
     LINE_EDGE_SLACK_M,
     LINE_FRONT_COS,
     LINE_JOIN_M,
-    LINE_LOG_ODDS_MAX,
     LINE_SAME_M,
     LINE_SILENCE_WITHIN_M,
     LINE_SLACK_M,
     LINE_START_LOG_ODDS,
     PARALLEL_COS,
-    WALL_ECHOES_MIN,
+    SURE_HITS,
     WALL_FRONT_RADII,
     WALL_LENGTH_MIN_M,
 )
@@ -78,7 +77,7 @@ def reaches(line: Line, along: float, beyond: float) -> bool:
 @kernel
 def is_sure_line(line: Line) -> bool:
     """Return whether a line is long enough and has enough echoes to be called a wall."""
-    return bool(line.echoes > WALL_ECHOES_MIN and line.high - line.low > WALL_LENGTH_MIN_M)
+    return bool(line.echoes > SURE_HITS and line.high - line.low > WALL_LENGTH_MIN_M)
 
 
 @kernel
@@ -249,7 +248,7 @@ def update_lines(s: StateRecord, p: SettingsRecord, m: int) -> None:
                         explain(s, i, k)
                     line.low = min(line.low, foot)
                     line.high = max(line.high, foot)
-                    line.log_odds = min(line.log_odds + LINE_ECHO_LOG_ODDS, LINE_LOG_ODDS_MAX)
+                    line.log_odds = min(line.log_odds + LINE_ECHO_LOG_ODDS, 2.0 * LINE_START_LOG_ODDS)
                     line.echoes += 1.0
                     correct_line(line, x - line.origin_x, y - line.origin_y, e, var)
                 elif goes_through(line, q, p, dot, foot, e):

@@ -143,17 +143,15 @@ LINE_EDGE_GROW_M: Final = 0.7 * FOOT_M
 LINE_EDGE_COS: Final = 0.1
 """Such echoes count up to this cosine beyond the beam's edge."""
 LINE_START_LOG_ODDS: Final = 3.0
-"""Log odds of a new line."""
-LINE_LOG_ODDS_MAX: Final = 6.0
-"""Greatest log odds of a line."""
+"""Log odds of a new line; its greatest are twice as much."""
 LINE_ECHO_LOG_ODDS: Final = 0.5
 """What an echo adds to a line's log odds."""
 LINE_LENGTH_MIN_M: Final = 0.8 * FOOT_M
 """Least length of a line that is kept."""
 ASSOCIATING_LINE_M: Final = 4.0 * FOOT_M
 """Least length of a line that takes readings from other explanations."""
-WALL_ECHOES_MIN: Final = 10.0
-"""A wall is a line that explained more echoes than this."""
+SURE_HITS: Final = 10.0
+"""A wall is a line that explained more echoes than this; least hits to establish the track of a polygon."""
 WALL_LENGTH_MIN_M: Final = 2.0 * FOOT_M
 """A wall is a line longer than this."""
 
@@ -203,8 +201,6 @@ CIRCLE_EVIDENCE_MIN_NAT: Final = 10.0
 SWITCH_LEAD_NAT: Final = 6.0
 """Lead required of another explanation: of a circle or a line over a circle, of an unknown object, at which a track
 ends, and of an established polygon over a circle in its place."""
-RIVAL_OVER_UNKNOWN_NAT: Final = 3.0
-"""Lead required of a rival over an unknown object."""
 CENTRE_VARIANCE_MAX_M2: Final = 0.2 * FOOT_M * FOOT_M
 """Greatest variance assumed for a fitted centre."""
 
@@ -213,7 +209,7 @@ CENTRE_VARIANCE_MAX_M2: Final = 0.2 * FOOT_M * FOOT_M
 UNKNOWN_NAT: Final = 2.0
 """Evidence of an unknown object for each near reading, against a circle."""
 MODEL_PRIOR_NAT: Final = 3.0
-"""Log prior of a known model over every other explanation."""
+"""Log prior of a known model over every other explanation, and of a rival over an unknown object."""
 LINE_PRIOR_NAT: Final = 1.0
 """Log prior ratio of walls to models."""
 DISPERSION_MIN: Final = 0.0015
@@ -251,7 +247,8 @@ IN_WALL_NAT: Final = -8.0
 ESTABLISH_PROBABILITY: Final = 0.7
 """Least probability of a track that is established."""
 ESTABLISH_HITS: Final = 8.0
-"""Least hits of a track that is established, and of a new line that is kept."""
+"""Least hits of a track that is established, and of a new line that is kept. As many readings are added to an
+object's count, so that one with few is not refined at every reading."""
 ESTABLISH_ROOT_M: Final = 0.25 * FOOT_M
 """Greatest standard deviation of a track that is established."""
 DOUBT_PROBABILITY: Final = 0.2
@@ -330,8 +327,9 @@ UNKNOWN_HITS_MIN: Final = 5.0
 
 ROOM_MARGIN_M: Final = 0.2
 """Mapped walls explain as far as this beyond the ends of their spans, and a thin object there is the wall's edge."""
-MODEL_CHECK_EVERY: Final = 4
-"""A named object is checked in every fourth of its refinements."""
+SOME_REFINEMENTS: Final = 4
+"""In one of so many of its refinements a named object is checked, and a polygon searched whose covariance is known
+and that explains its readings. The search is wide in so many first ones, and then in one of twice as many."""
 READINGS_MEMORY: Final = 0.999
 """Factor on counts and sums after each reading: a memory of a thousand, a few seconds of driving."""
 MIRRORS_HEARD: Final = 8
@@ -366,8 +364,6 @@ UNSURE_FACTOR: Final = 4.0
 """Factor on the evidence of an object that is not certain, so that it is refined earlier."""
 UNSURE_ROOT_M: Final = 0.03 * FOOT_M
 """An object is not certain if its position is less certain than this, and perhaps wrong."""
-RESERVOIR_OFFSET: Final = 8.0
-"""Readings added to an object's count, so that an object with few is not refined at every reading."""
 FINAL_VALUE: Final = 1e-6
 """Value of a final refinement above the threshold."""
 PASSED_OVER_MAX: Final = 60

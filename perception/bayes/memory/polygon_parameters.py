@@ -34,12 +34,6 @@ SEARCH_SHRINK: Final = 0.5
 """Factor on the steps when no move gains."""
 SEARCH_GAIN_MIN_NAT: Final = 1e-6
 """Smallest score gain that counts as progress."""
-SEARCH_EVERY: Final = 4
-"""A pose whose covariance is known and that explains its readings is searched only once in this many refinements."""
-WIDE_SEARCHES_FIRST: Final = 4
-"""The search is wide in so many first refinements."""
-WIDE_SEARCH_EVERY: Final = 8
-"""After these the search is wide in one of so many refinements."""
 FITTING_SHARE: Final = 0.85
 """The search is wide every other time while less than this share of the near readings is explained."""
 COARSE_READINGS: Final = 96
@@ -131,8 +125,6 @@ POLYGON_EVIDENCE_MIN_NAT: Final = 5.0
 """A track with less evidence than this ends."""
 POLYGON_UNKNOWN_LEAD_NAT: Final = 8.0
 """A track ends if the evidence of an unknown object leads it by this."""
-POLYGON_ESTABLISH_HITS: Final = 10.0
-"""Least hits to establish a track."""
 POLYGON_ESTABLISH_SURE: Final = 3.0
 """Least sure hits to establish a track: corners alone fit anywhere."""
 MANY_HITS: Final = 20.0

@@ -17,8 +17,8 @@ from perception.bayes.memory.parameters import (
     MAY_ANSWER_DEG,
     PLACED_SIGMA_M,
     ROOM_MARGIN_M,
+    SURE_HITS,
     UNKNOWN_HITS_MIN,
-    WALL_ECHOES_MIN,
     WALL_LENGTH_MIN_M,
 )
 from perception.bayes.memory.polygon_parameters import EDGE_REACH_M, POLYGON_INFLATION
@@ -150,7 +150,7 @@ def archived_models(
 def known_walls(memory: Memory) -> Structured:
     """Return the lines that recognition takes for walls, as records of `state.Line`."""
     lines = memory.state["lines"][0]
-    is_wall = (lines["echoes"] > WALL_ECHOES_MIN) & (lines["high"] - lines["low"] > WALL_LENGTH_MIN_M)
+    is_wall = (lines["echoes"] > SURE_HITS) & (lines["high"] - lines["low"] > WALL_LENGTH_MIN_M)
     return lines[is_wall]
 
 

@@ -22,7 +22,7 @@ from perception.bayes.memory.job_records import (
     SEARCH_NEAR,
     SEARCH_WIDE,
 )
-from perception.bayes.memory.parameters import ELSEWHERE_LEAD_NAT, PLACED_STRAY_MAX_M
+from perception.bayes.memory.parameters import ELSEWHERE_LEAD_NAT, PLACED_STRAY_MAX_M, SURE_HITS
 from perception.bayes.memory.polygon_parameters import (
     FITTING_SHARE,
     LATTICE_ATTEMPTS,
@@ -31,7 +31,6 @@ from perception.bayes.memory.polygon_parameters import (
     OVERLAP_RADII,
     POLYGON_DOUBT_PROBABILITY,
     POLYGON_DOUBT_SHARE,
-    POLYGON_ESTABLISH_HITS,
     POLYGON_ESTABLISH_SURE,
     POLYGON_EVIDENCE_MIN_NAT,
     POLYGON_UNKNOWN_LEAD_NAT,
@@ -87,7 +86,7 @@ def update_polygon_status(s: StateRecord, p: SettingsRecord, track: PolygonTrack
     elif track.status == TENTATIVE:
         is_fitting = track.hits > FITTING_SHARE * track.near
         sure = POLYGON_ESTABLISH_SURE if track.hits < MANY_HITS else MANY_HITS_SURE
-        is_heard = track.hits >= POLYGON_ESTABLISH_HITS and track.sure_hits >= sure
+        is_heard = track.hits >= SURE_HITS and track.sure_hits >= sure
         if track.probability > LIKELY and is_fitting and is_heard:
             s[0].job.stage = LATTICE
             if track.covariance.xx > 0.0:

@@ -41,12 +41,12 @@ from perception.bayes.memory.parameters import (
     LINE_LENGTH_MIN_M,
     LINE_PRIOR_NAT,
     LOST_NAT,
-    MODEL_CHECK_EVERY,
     OTHER_FIT_STEPS,
     PLACED_STRAY_MAX_M,
     RANGE_VARIANCE_MIN_M2,
     READINGS_MIN,
     ROOT_CORRELATION_MAX,
+    SOME_REFINEMENTS,
     SWITCH_LEAD_NAT,
     SWITCH_ROOT_M,
     SWITCH_UNSEEN,
@@ -328,7 +328,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
         compare_rays(s, p, track, n)
     careful = is_careful(s, tracks, p)
     add_residuals(s, tracks, p, t, n, careful)
-    is_due = track.is_named == 0 or track.refinements % MODEL_CHECK_EVERY == 0
+    is_due = track.is_named == 0 or track.refinements % SOME_REFINEMENTS == 0
     if track.kind < p[0].model_count and is_due:
         track.outline_lead = outline_lead(s, p, track, n)
         track.round_lead = round_lead(s, p, n)

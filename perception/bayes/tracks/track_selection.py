@@ -12,9 +12,9 @@ import math
 
 from perception.bayes.memory.elements import MAX_POLYGONS
 from perception.bayes.memory.parameters import (
+    ESTABLISH_HITS,
     FINAL_VALUE,
     PASSED_OVER_MAX,
-    RESERVOIR_OFFSET,
     UNSURE_FACTOR,
     UNSURE_ROOT_M,
 )
@@ -41,7 +41,7 @@ def unseen_evidence(track: AnyTrack, idle_firings: int, threshold: float, weight
     weight : float
         Factor.
     """
-    v: float = weight * (track.unseen / (track.reservoir + RESERVOIR_OFFSET))
+    v: float = weight * (track.unseen / (track.reservoir + ESTABLISH_HITS))
     if track.idle_firings > idle_firings and track.final_refinements > 0:
         v += threshold + FINAL_VALUE
     return v

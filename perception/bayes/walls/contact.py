@@ -31,6 +31,12 @@ SPAN_MARGIN_M: Final = 0.09
 PLACE_SLACK_M: Final = 0.05
 """Uncertainty of the place of a wall's end, a known circle or an edge: a range that is longer by this, beyond its
 error, has passed, and a circle's centre so far outside the beam may still answer."""
+END_MARGIN_M: Final = 0.15
+"""What lies nearer than this to the end of a wall is the end itself: corners are farther beyond it, and what shows
+how walls answer is farther inside."""
+SURE_SHARE: Final = 0.1
+"""A share up to this of passes in a place's weight, or of a line's variance in a range's, leaves what is measured
+sure."""
 EDGE_SIGMA_M: Final = 0.1
 """Uncertainty of an edge along its wall and across it, before its echoes: after a move by as much it is another
 place, and a range longer than to it by this passed it."""

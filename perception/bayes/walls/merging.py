@@ -40,6 +40,7 @@ from perception.bayes.walls.contact import (
     line_variance,
     tolerance,
 )
+from perception.bayes.walls.corners import ALONE_LEAD
 from perception.bayes.walls.evidence import FLAT_BINS_MIN
 from perception.bayes.walls.fit import fit_walls
 from perception.kernel import kernel
@@ -52,8 +53,6 @@ SAME_WITHIN_M: Final = 1.0
 """Distance from the other's spans within which they are compared."""
 SAME_SLACK_M: Final = 0.025
 """Greatest distance between two walls that are one, beyond `SAME_SIGMAS`."""
-SAME_SHARE: Final = 2
-"""So many times more bins must agree than differ."""
 EXPLAINED_SHARE: Final = 0.6
 """A wall ends when others explain this share of its bins, or fewer than `FLAT_BINS_MIN` are its own."""
 MERGED_MISFIT_MAX: Final = 3.0
@@ -88,7 +87,7 @@ def are_one(main: Wall, part: Wall) -> bool:
             same += 1
         else:
             other += 1
-    return same > SAME_SHARE * other
+    return same > ALONE_LEAD * other
 
 
 @kernel

@@ -31,6 +31,7 @@ from perception.bayes.memory.wall_records import (
 from perception.bayes.walls.bins import HALF
 from perception.bayes.walls.contact import (
     EDGE_SIGMA_M,
+    END_MARGIN_M,
     FIRM_WEIGHT,
     HEARD_REACH_M,
     SAME_SIGMAS,
@@ -63,8 +64,6 @@ LINE_CELL_M: Final = 0.05
 """Edge of a cell along a wall's line in which echoes of a point are counted."""
 EDGE_CUTS_MIN: Final = 2
 """Cuts in one cell for which an edge is looked for there."""
-BEYOND_MIN_M: Final = 0.15
-"""The corner lies at least this far beyond the wall's end; nearer ones are found as the end itself."""
 INSIDE_M: Final = 0.25
 """What lies farther than this inside a span is no edge."""
 ACROSS_M: Final = 1.15
@@ -339,7 +338,7 @@ def find_heard_points(memory: Memory, p: SettingsRecord, turn: int) -> None:
     cuts = cells[:, :-1] + cells[:, 1:]  # in places as wide as two cells, which overlap
     at = FIRST_M + LINE_CELL_M * np.arange(1.0, LINE_CELLS)
     beyond = np.maximum(low[0] - at, at - high[-1])
-    corners = np.where((beyond > BEYOND_MIN_M) & (beyond < HEARD_REACH_M), cuts.sum(axis=0), 0.0)
+    corners = np.where((beyond > END_MARGIN_M) & (beyond < HEARD_REACH_M), cuts.sum(axis=0), 0.0)
     within = np.minimum(at[:, None] - low, high - at[:, None]).max(axis=1)
     edges = np.where((within < INSIDE_M) & (within > -ACROSS_M), cuts[0], 0.0)
     is_new = False

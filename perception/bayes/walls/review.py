@@ -26,6 +26,7 @@ from perception.bayes.walls.contact import (
     FOOT,
     NOWHERE,
     SPAN_MARGIN_M,
+    SURE_SHARE,
     SURE_SPAN_WEIGHT,
     are_mirrors,
     contact,
@@ -65,8 +66,6 @@ PLACE_NAT: Final = 10.0
 """Greatest evidence of one place: the errors of its readings are not independent."""
 AS_WELL: Final = 0.3
 """Another wall explains an echo as well if its error, as a share of the greatest explained, is not larger by this."""
-SURE_PASSES: Final = 0.1
-"""A place on a span of `SURE_SPAN_WEIGHT`, and of so small a share of passes, is its wall's."""
 UNHEARD_NAT: Final = 0.35
 """Evidence against a place without readings."""
 SWITCH_NAT: Final = 4.0
@@ -158,7 +157,7 @@ def weigh(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, k: int) -> No
         slack = tolerance(room, wall, along, expected, cosine)
         of = wall.bins[b]
         is_sure = (
-            of.weight >= SURE_SPAN_WEIGHT and of.passes < SURE_PASSES * of.weight and is_on_span(wall, along, 0.0)
+            of.weight >= SURE_SPAN_WEIGHT and of.passes < SURE_SHARE * of.weight and is_on_span(wall, along, 0.0)
         )
         if e > slack:
             x, y = wall_point(wall, along)

@@ -34,6 +34,7 @@ from perception.bayes.memory.wall_records import (
 from perception.bayes.walls.bins import PASSES_KEPT, SILENT_PASS, bin_of, enter_pass, enter_reading
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
+    END_MARGIN_M,
     EXPLAINED_SIGMAS,
     FIRM_WEIGHT,
     FOOT,
@@ -68,8 +69,6 @@ REVIEW_FIRINGS: Final = 4
 twice as many there is a pass over pairs of walls, and a look for what is heard on a wall's line."""
 BEAM_WALL_WEIGHT_MIN: Final = 40.0
 """Walls of this weight show whether slanting walls answer from the beam's edge."""
-EDGE_WITHIN_M: Final = 0.15
-"""They show it only this far inside their ends."""
 THIN_M: Final = 0.2
 """Echoes of round objects thinner than this start no wall and extend none."""
 LOUD_SHARE: Final = 1.2
@@ -104,7 +103,7 @@ def weaken(room: WallMap, tracks: CircleTracks, q: Reading, own: int, p: Setting
         slack = tolerance(room, wall, along, expected, dot)
         if kind == BEAM_EDGE:
             is_free = own < 0 or k == own
-            if wall.weight > BEAM_WALL_WEIGHT_MIN and is_free and is_on_span(wall, along, -EDGE_WITHIN_M):
+            if wall.weight > BEAM_WALL_WEIGHT_MIN and is_free and is_on_span(wall, along, -END_MARGIN_M):
                 if abs(e) < slack:
                     room.edge_echoes += 1.0
                 elif e > slack + PLACE_SLACK_M:

@@ -12,7 +12,6 @@ from typing import Final
 from perception.kernel import Floats, kernel
 from perception.localization.drift.landmark_association import (
     MARGIN_RAD,
-    NO_LANDMARK,
     associate,
     bearing_variance,
     is_landmark_hidden,
@@ -28,7 +27,7 @@ from perception.localization.drift.landmark_state import (
     SonarModel,
 )
 from perception.sensor_mounts import RingPose, SensorPose
-from perception.shared_numbers import NO_RANGE, OUTLIER_SIGMAS, PASSED_M, SPACING
+from perception.shared_numbers import NO_INDEX, NO_RANGE, OUTLIER_SIGMAS, PASSED_M, SPACING
 
 SOFT: Final = 6.25
 """Normalised squared innovation from which on a reading's weight is reduced: its tails are heavier than a bell's."""
@@ -226,7 +225,7 @@ def update_with_range(
     r: float,
     sonar: SonarModel,
 ) -> int:
-    """Enter the range of one sensor; return the landmark that it is from, or `NO_LANDMARK`.
+    """Enter the range of one sensor; return the landmark that it is from, or `NO_INDEX`.
 
     The reading is from the landmark in the beam whose predicted range is nearest in standard deviations. Where two
     explain it, it is not used. A range that passed a landmark which should have answered moves that out of the beam;
@@ -254,19 +253,19 @@ def update_with_range(
     best, best_nis, is_ambiguous, first, nearest, is_expected = associate(e, covariance, (x, y, ax, ay), r, sonar)
     if (
         is_expected
-        and best == NO_LANDMARK
+        and best == NO_INDEX
         and (r < nearest - NEAR_M or may_answer_instead(e, first, x, y, ax, ay, half_angle, r))
     ):
         is_expected = False
     if is_expected:
-        est.fit_share += STRAY_MEMORY * ((1.0 if best != NO_LANDMARK else 0.0) - est.fit_share)
-    is_missed = first != NO_LANDMARK and first != best and r > nearest + PASSED_M and nearest < sonar.range_max
+        est.fit_share += STRAY_MEMORY * ((1.0 if best != NO_INDEX else 0.0) - est.fit_share)
+    is_missed = first != NO_INDEX and first != best and r > nearest + PASSED_M and nearest < sonar.range_max
     if is_missed and not is_landmark_hidden(e, first, x, y):
         update_with_edge(e, covariance, first, mx, my, axis, half_angle, NO_RANGE)
-    elif best == NO_LANDMARK and is_expected and abs(r - nearest) <= NEAR_M:
+    elif best == NO_INDEX and is_expected and abs(r - nearest) <= NEAR_M:
         est.landmarks[first].failures += 1
-    if best == NO_LANDMARK or is_ambiguous:
-        return NO_LANDMARK
+    if best == NO_INDEX or is_ambiguous:
+        return NO_INDEX
     correct_with_range(e, covariance, best, best_nis, mount, r, sonar)
     return best
 
@@ -304,6 +303,6 @@ def update_with_firing(
             continue
         if r >= sonar.range_max:
             r = math.inf
-        if update_with_range(e, covariance, (mx, my, axis), r, sonar) != NO_LANDMARK:
+        if update_with_range(e, covariance, (mx, my, axis), r, sonar) != NO_INDEX:
             used += 1
     return used

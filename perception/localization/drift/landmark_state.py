@@ -31,10 +31,8 @@ SCALE_MAX: Final = 2.0
 """Greatest scale of odometer and ranges; its inverse is the least, by which something is divided: those of a real
 robot are near 1."""
 
-HEADING, X, Y, OFFSET, ODOMETER, TURN, RANGE = range(7)
-"""Rows of the covariance for the fields of `Estimate`, in their order; those of the landmarks follow."""
-FIRST: Final = 7
-"""Row of the first landmark's x."""
+HEADING, X, Y, OFFSET, ODOMETER, TURN, RANGE, FIRST = range(8)
+"""Rows of the covariance for the fields of `Estimate`, in their order, and the row of the first landmark's x."""
 ROWS_MAX: Final = FIRST + 2 * LANDMARKS_MAX
 """Rows of the state: that of the robot, and the place of each landmark."""
 

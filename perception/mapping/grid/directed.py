@@ -336,7 +336,7 @@ class DirectedGrid:
         """Enter a firing; see `EvidenceGrid.observe`."""
         if not self.window.follow(firing.pose, (self.cells, self._maybe_sure)):
             return
-        self._place = 1 + place % (PLACE_NUMBERS - 1)  # never NO_PLACE_NUMBER
+        self._place = 1 + place % (PLACE_NUMBERS - 1)  # never NO_NUMBER
         enter_readings(
             self._planes,
             self._maybe_sure,
