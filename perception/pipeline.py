@@ -99,7 +99,7 @@ class Perception:
         mounts = mounts_array(ring.mounts)
         self._axes, self._turning = mounts[:, 2].copy(), list(ring.turning)
         self._half_angle, self._models = math.radians(ring.beam_half_angle_deg), tuple(models)
-        self._echoes = FreshEchoes(mounts, self._half_angle, ring.turning, ring.window_m)
+        self._echoes = FreshEchoes(mounts, self._half_angle, ring.turning, ring.window_m, ring.sensor_of)
         self._reach_m, self._sensors, self._farthest_m = reach_m(ring), len(ring.mounts), farthest_m(ring.mounts)
         self.vacant = VacantAreas()  # in the frame of `method`
         self.canyon_map = CanyonMap(2.0 * (self._farthest_m + PASSAGE_M) - ENDS_M)

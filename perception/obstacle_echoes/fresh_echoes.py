@@ -261,6 +261,8 @@ class FreshEchoes:
         The sensors that turn with the wheels, as `config.robot.RingConfig.turning`.
     reach_m : float
         Range up to which the ring listens, m.
+    sensor_of : tuple of int
+        As `config.robot.RingConfig.sensor_of`; each mount is a sensor of its own if it is left out.
     """
 
     SCRATCH: Final = ("_agreed", "_kept")
@@ -276,7 +278,12 @@ class FreshEchoes:
     )
 
     def __init__(
-        self, mounts: Floats, half_angle: float, turning: tuple[int, ...] = (), reach_m: float = math.inf
+        self,
+        mounts: Floats,
+        half_angle: float,
+        turning: tuple[int, ...] = (),
+        reach_m: float = math.inf,
+        sensor_of: tuple[int, ...] = (),
     ) -> None:
         self._mounts, self._turning = mounts, turning
         self.set_reach(reach_m)
@@ -289,7 +296,7 @@ class FreshEchoes:
         self._kept = KeptLooks(self._points, self._bearings, self._times, self._heard, self._steady)
         self._agreed = np.zeros(len(mounts), dtype=np.bool_)
         self._radius_m = max(math.hypot(*mount[:2]) for mount in mounts.tolist())
-        self.unheard = UnheardEchoes(mounts)
+        self.unheard = UnheardEchoes(mounts, sensor_of)
         """What the ring has lost."""
         self._walls = BlindWalls(mounts, half_angle, turning)
 
@@ -312,6 +319,8 @@ class FreshEchoes:
             self._agreed,
             self.unheard.records,
         )
+        reception, robot_s = (core, self._heard_reach_m, self._radius_m), float(firing.robot_s)
+        self.unheard.remembered.enter(firing.ranges_m, mounts, pose, robot_s, reception, self._agreed)
         heard_new = not self.unheard.silences[UNCHANGED]
         contradict_echoes(
             firing.ranges_m,

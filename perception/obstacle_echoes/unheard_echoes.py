@@ -25,6 +25,7 @@ from drivers.messages import Pose
 from perception.bounds import COUNT, PLACE, Flag, Place, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
 from perception.obstacle_echoes.blind_walls import TURN_DIRECTIONS, WIDTH_RAD, BlindWalls, middle_walls
+from perception.obstacle_echoes.remembered_echoes import RememberedEchoes
 from perception.records import Record, Records, records, zeros
 from perception.sensor_mounts import RingPose
 from perception.shared_numbers import SAME_ECHO_M
@@ -242,19 +243,22 @@ class UnheardEchoes:
     ----------
     mounts : (n, 3) float
         x, y (m), direction (rad) of each sensor in the ring's frame.
+    sensor_of : tuple of int
+        As of `FreshEchoes`.
     """
 
     SCRATCH: Final = ("records", "_places", "_are_steady")
     """Not part of a snapshot: views of an array that is."""
     BOUNDS: Final = bounds(_echoes=UnheardEcho.BOUNDS, silences=COUNT, _walls_m=PLACE._replace(infinite=True))
 
-    def __init__(self, mounts: Floats) -> None:
+    def __init__(self, mounts: Floats, sensor_of: tuple[int, ...] = ()) -> None:
         self._echoes = zeros(UnheardEcho, len(mounts))
         self.records = records(UnheardEcho, self._echoes)
         self._places = self._echoes[["state", "x", "y"]]
         self._are_steady = self._echoes["is_steady"]
         self.silences = np.zeros(2, np.int64)
         self._walls_m = np.full(TURN_DIRECTIONS, math.inf)
+        self.remembered = RememberedEchoes(sensor_of or tuple(range(len(mounts))))
 
     def falls_silent(self, which: int) -> bool:
         """Return whether half of the ring's sensors have looked since it heard anything (new), and not all twice."""
@@ -341,4 +345,5 @@ class UnheardEchoes:
     def clear(self) -> None:
         """Forget all echoes and walls."""
         self._echoes["state"] = NOT_KEPT
+        self.remembered.clear()
         self._walls_m[:] = math.inf

@@ -1,0 +1,255 @@
+"""Steady echoes of the last seconds, wherever they were heard: the robot must not drive fast at what it heard before.
+
+A robot that turns looks with other sensors at what it heard, and a robot that comes back looks again. Where those
+sensors have heard nothing since, nothing shows that they hear: their silence contradicts no echo. An echo from its
+place or from behind it does, and so does the silence of a sensor that has heard something since, or that of the very
+sensor while the ring stands as it stood: what was there has left.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.messages import Pose
+from perception.angles import SAME_RAD, wrapped
+from perception.bounds import CONSTANT, Flag, Place, bounds, index_of
+from perception.kernel import Floats, Ints, kernel
+from perception.records import Record, Records, records, zeros
+from perception.sensor_mounts import RingPose
+
+REMEMBERED_S: Final = 30.0
+"""An echo is remembered for so long, s: a robot that turns away from what it hears is back at it within that."""
+HEARS_S: Final = 1.5
+"""A sensor whose last echo came so much later than another one hears, s: as long as echoes count as fresh."""
+REMEMBERED_PLACES: Final = 128
+"""Echoes that are remembered; the oldest makes room. At .3 m/s a ring of 24 sensors fills it in 5 to 15 s."""
+ONE_PLACE_M: Final = 0.1
+"""Echoes that are nearer to each other are one, m."""
+STANDS_M: Final = 1e-3
+"""A sensor that has moved by less stands, m."""
+
+
+class RememberedEcho(Record):
+    """One echo."""
+
+    is_kept: Flag
+    t: Place
+    """When it was heard last, s."""
+    x: Place
+    """Its place, m."""
+    y: Place
+    sensor: Annotated[int, index_of(256)]
+    """What heard it, and from where: m, m, rad."""
+    from_x: Place
+    from_y: Place
+    axis: Place
+
+
+class LastHeard(Record):
+    """When one sensor heard its last echoes."""
+
+    is_echo: Flag
+    """Whether its last look heard an echo."""
+    has_heard: Flag
+    t: Place
+    """When it last heard two in succession, s: a single one may be random, or all that a broken sensor hears."""
+
+
+@kernel
+def is_from_there(one: RememberedEcho, x: float, y: float, axis: float) -> bool:
+    """Return whether an echo was heard from a place, m, in a direction, rad."""
+    stands = abs(one.from_x - x) + abs(one.from_y - y) < STANDS_M
+    return bool(stands and abs(wrapped(axis - one.axis)) < SAME_RAD)
+
+
+@kernel
+def enter_echo(x: float, y: float, sensor: int, place: RingPose, t: float, echoes: Records[RememberedEcho]) -> None:
+    """Enter an echo at x, y (m) that a sensor heard from a place (m, m, rad) at a time, s, for the oldest one."""
+    free = 0
+    for k in range(len(echoes)):
+        if not echoes[k].is_kept:
+            free = k
+            break
+        if echoes[k].t < echoes[free].t:
+            free = k
+    one = echoes[free]
+    one.is_kept, one.t, one.x, one.y, one.sensor = 1, t, x, y, sensor
+    one.from_x, one.from_y, one.axis = place
+
+
+@kernel
+def contradict_remembered(
+    i: int, r: float, place: RingPose, hears_s: float, reach: float, slope: float, echoes: Records[RememberedEcho]
+) -> None:
+    """Forget the echoes that a reading contradicts.
+
+    Parameters
+    ----------
+    i : int
+        The sensor.
+    r : float
+        Its reading, m.
+    place : RingPose
+        Its place, m, and direction, rad.
+    hears_s : float
+        Its silence contradicts what was heard before this, s.
+    reach : float
+        Up to which it hears, m.
+    slope : float
+        Tangent of the angle from its axis within which it hears.
+    echoes
+        As for `remember`. Updated.
+    """
+    x, y, axis = place
+    ux, uy = math.cos(axis), math.sin(axis)
+    for k in range(len(echoes)):
+        one = echoes[k]
+        dx, dy = one.x - x, one.y - y
+        ahead, across = dx * ux + dy * uy, abs(dy * ux - dx * uy)
+        if not one.is_kept or ahead <= 0.0:
+            continue
+        is_seen = across < ahead * slope and ahead < min(r, reach)
+        if r < reach:
+            is_over = is_seen or (abs(ahead - r) < ONE_PLACE_M and across < ONE_PLACE_M)
+        else:
+            is_over = (is_seen and one.t < hears_s) or (one.sensor == i and is_from_there(one, x, y, axis))
+        if is_over:
+            one.is_kept = 0
+
+
+@kernel
+def remember(
+    ranges: Floats,
+    mounts: Floats,
+    pose: RingPose,
+    t: float,
+    reception: tuple[float, float, float],
+    agreed: NDArray[np.bool_],
+    sensor_of: Ints,
+    echoes: Records[RememberedEcho],
+    last_heard: Records[LastHeard],
+) -> None:
+    """Enter the readings of a firing.
+
+    Parameters
+    ----------
+    ranges : (n,) float
+        As in a `Firing`, m.
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor in the ring's frame.
+    pose : RingPose
+        Place (m) and direction (rad) of the ring.
+    t : float
+        Time of the firing, s.
+    reception : (float, float, float)
+        A sensor hears what is so near to its axis, rad, and up to so far away, m; radius of the ring, m.
+    agreed : (n,) bool
+        Whether another look agrees with the sensor's echo in this firing: only such echoes count.
+    sensor_of : (n,) int
+        As `config.robot.RingConfig.sensor_of`.
+    echoes : (REMEMBERED_PLACES,) records
+        The echoes. Updated.
+    last_heard : (n,) records
+        Of each sensor. Updated.
+    """
+    x, y, yaw = pose
+    core, reach, radius = reception
+    c, s, slope = math.cos(yaw), math.sin(yaw), math.tan(core)
+    for k in range(len(echoes)):
+        one = echoes[k]
+        if not t - REMEMBERED_S <= one.t <= t or math.hypot(one.x - x, one.y - y) < radius:
+            one.is_kept = 0
+    for i in range(ranges.shape[0]):
+        r = ranges[i]
+        if math.isnan(r):
+            continue
+        own, is_echo = last_heard[sensor_of[i]], r < reach
+        if is_echo and own.is_echo:
+            own.has_heard, own.t = 1, t
+        own.is_echo = 1 if is_echo else 0
+        if is_echo and not agreed[i]:
+            continue
+        axis = yaw + mounts[i, 2]
+        own_x, own_y = x + c * mounts[i, 0] - s * mounts[i, 1], y + s * mounts[i, 0] + c * mounts[i, 1]
+        place, hears_s = (own_x, own_y, axis), own.t - HEARS_S if own.has_heard else -math.inf
+        contradict_remembered(i, r, place, hears_s, reach, slope, echoes)
+        if is_echo:
+            enter_echo(own_x + r * math.cos(axis), own_y + r * math.sin(axis), i, place, t, echoes)
+
+
+@kernel
+def find_ahead(
+    pose: RingPose, length: float, half_width: float, echoes: Records[RememberedEcho], found: Floats
+) -> int:
+    """Find the echoes ahead; return how many there are.
+
+    Parameters
+    ----------
+    pose : RingPose
+        The robot's, m and rad, turned into the direction in which it drives.
+    length, half_width : float
+        Length and half the width of the way ahead, m.
+    echoes
+        As for `remember`.
+    found : (REMEMBERED_PLACES, 2) float
+        The first ones are the places, m. Overwritten.
+    """
+    x, y, theta = pose
+    c, s = math.cos(theta), math.sin(theta)
+    count = 0
+    for k in range(len(echoes)):
+        dx, dy = echoes[k].x - x, echoes[k].y - y
+        if echoes[k].is_kept and 0.0 < c * dx + s * dy < length and abs(c * dy - s * dx) < half_width:
+            found[count, 0], found[count, 1] = echoes[k].x, echoes[k].y
+            count += 1
+    return count
+
+
+class RememberedEchoes:
+    """What a ring has heard in the last seconds.
+
+    Parameters
+    ----------
+    sensor_of : tuple of int
+        As `config.robot.RingConfig.sensor_of`.
+    """
+
+    SCRATCH: Final = ("_echo_records", "_heard_records")
+    """Not part of a snapshot: views of arrays that are."""
+    BOUNDS: Final = bounds(_sensor_of=CONSTANT, _echoes=RememberedEcho.BOUNDS, _heard=LastHeard.BOUNDS)
+
+    def __init__(self, sensor_of: tuple[int, ...]) -> None:
+        self._sensor_of = np.array(sensor_of, np.int64)
+        self._echoes, self._heard = zeros(RememberedEcho, REMEMBERED_PLACES), zeros(LastHeard, len(sensor_of))
+        self._echo_records, self._heard_records = (
+            records(RememberedEcho, self._echoes),
+            records(LastHeard, self._heard),
+        )
+
+    def enter(
+        self,
+        ranges_m: Floats,
+        mounts: Floats,
+        pose: RingPose,
+        robot_s: float,
+        reception: tuple[float, float, float],
+        agreed: NDArray[np.bool_],
+    ) -> None:
+        """Enter the readings of a firing, as `remember`."""
+        of = (self._sensor_of, self._echo_records, self._heard_records)
+        remember(ranges_m, mounts, pose, robot_s, reception, agreed, *of)
+
+    def ahead(self, pose: Pose, length_m: float, half_width_m: float) -> Floats:
+        """Return the places within the way ahead, shape (k, 2), m."""
+        found = np.empty((REMEMBERED_PLACES, 2))
+        place = (float(pose.x), float(pose.y), float(pose.theta))
+        return found[: find_ahead(place, length_m, half_width_m, self._echo_records, found)]
+
+    def clear(self) -> None:
+        """Forget all echoes, and what has heard."""
+        self._echoes[...] = np.zeros((), self._echoes.dtype)
+        self._heard[...] = np.zeros((), self._heard.dtype)
