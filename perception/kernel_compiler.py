@@ -175,12 +175,15 @@ class _KernelCache:
         self._allocates = allocates
 
     def load_overload(self, sig: Untyped, target_context: Untyped) -> Untyped:
-        """Return the compiled code for a signature, None if it is not there."""
+        """Return the compiled code for a signature, None if it is not there.
+
+        Nor is it where it names a type of another version that has moved since, with the same kernel.
+        """
         if self._allocates:
             target_context.refresh()
         try:
             data = _files()._load_data(self._name(sig, target_context))
-        except FileNotFoundError:
+        except (FileNotFoundError, ImportError, AttributeError):
             return None
         called, engine = data[1], target_context.codegen()._engine
         # Numba calls no code of which it has not seen the name, and ends the process for a name without code.

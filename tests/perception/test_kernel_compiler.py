@@ -146,6 +146,42 @@ def test_code_that_could_not_be_loaded_is_not_said_to_be_there(monkeypatch: pyte
     assert names == set()
 
 
+MOVED: Final = """
+from perception.kernel import kernel
+from {module} import Pair
+
+@kernel
+def total(pair: Pair) -> float:
+    return pair.a + pair.b
+
+print(total(Pair(1.0, 2.0)))
+"""
+PAIR: Final = """
+from typing import NamedTuple
+
+class Pair(NamedTuple):
+    a: float
+    b: float
+"""
+
+
+def test_code_that_names_a_type_which_has_moved_is_compiled_anew(tmp_path: Path) -> None:
+    program, outputs = tmp_path / "moved.py", []
+    for module in ("before", "after"):
+        for other in tmp_path.glob("[ab]*.py"):
+            other.unlink()
+        (tmp_path / f"{module}.py").write_text(PAIR)
+        program.write_text(MOVED.format(module=module))
+        environment = {
+            **child_environment(),
+            "NUMBA_CACHE_DIR": str(tmp_path / "kernels"),
+            "PYTHONPATH": str(tmp_path),
+        }
+        run = subprocess.run([sys.executable, program], env=environment, check=True, capture_output=True, text=True)
+        outputs.append(run.stdout.strip())
+    assert outputs == ["3.0", "3.0"]
+
+
 @kernel
 def nothing(_records: object) -> int:
     return 0
