@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 from llvmlite.binding import Linkage, parse_assembly
-from numba.core import compiler, config, event, sigutils, typed_passes, types, typing, untyped_passes
+from numba.core import compiler, config, errors, event, sigutils, typed_passes, types, typing, untyped_passes
 from numba.core.caching import (
     IndexDataCacheFile,
     InTreeCacheLocator,
@@ -23,6 +23,7 @@ from numba.core.caching import (
 )
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_machinery import PassManager
+from numba.core.cpu import CPUContext
 from numba.core.dispatcher import _FunctionCompiler
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.np.numpy_support import from_struct_dtype, map_layout
@@ -108,6 +109,76 @@ def _typing_context() -> _TypingContext:
     return _TypingContext()
 
 
+class _Operation(types.Function):  # type: ignore[misc]  # numba has no types
+    """An operator, which is resolved once for the same types; numba does so up to four times at each use."""
+
+    def __init__(self, templates: Untyped) -> None:
+        super().__init__(templates)
+        self._resolved: dict[Args, Untyped] = {}
+
+    def get_call_type(self, context: Untyped, args: Args, kws: Untyped) -> Untyped:
+        key = (args, tuple(kws.items()))
+        if key not in self._resolved:
+            try:
+                self._resolved[key] = super().get_call_type(context, args, kws)
+            except errors.TypingError:
+                self._resolved[key] = None
+        if self._resolved[key] is None:
+            raise errors.TypingError(self.name)
+        return self._resolved[key]
+
+
+class _LoweringContext(_TypingContext):
+    """What code is made with after all types are known."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._operations: dict[Untyped, _Operation] = {}
+
+    def resolve_value_type(self, val: Untyped) -> Untyped:
+        kind = super().resolve_value_type(val)
+        if type(kind) is not types.Function:
+            return kind
+        if kind not in self._operations:
+            self._operations[kind] = _Operation(kind.templates)
+            self._operations[kind]._impl_keys = kind._impl_keys  # of the types that it was already resolved for
+        return self._operations[kind]
+
+
+class _TargetContext(CPUContext):  # type: ignore[misc]  # numba has no types
+    """Numba's own context, which looks once for what is not defined for some types.
+
+    Numba asks at each access to an array whether the array is really another object, and at each access by a constant
+    whether there is special code for it. Each time that there is none, it looks for new definitions, and writes the
+    types of all fields into an error that it expects.
+    """
+
+    def __init__(self) -> None:
+        self.__dict__.update(vars(cpu_target.target_context))
+        self.typing_context = _LoweringContext()
+        self._undefined: set[Args] = set()
+
+    def get_function(self, fn: Untyped, sig: Untyped, _firstcall: bool = True) -> Untyped:
+        key = (fn, sig.as_function().args)
+        if key in self._undefined:
+            raise NotImplementedError(fn)
+        try:
+            return super().get_function(fn, sig, _firstcall)
+        except NotImplementedError:
+            self._undefined.add(key)
+            raise
+
+    def _compile_subroutine_no_cache(self, *args: Untyped, **kws: Untyped) -> Untyped:
+        """Compile a function of numba's own with its own types, to which `_Operation` does not belong."""
+        context = self.subtarget(typing_context=cpu_target.typing_context)
+        return super(_TargetContext, context)._compile_subroutine_no_cache(*args, **kws)
+
+
+@functools.cache
+def _target_context() -> _TargetContext:
+    return _TargetContext()
+
+
 class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]  # numba has no types
     """The code of a kernel for its callers: it is linked, and never run by itself."""
 
@@ -132,7 +203,7 @@ class _Compiler(_FunctionCompiler):  # type: ignore[misc]  # numba has no types
             options.no_cpython_wrapper = options.no_cfunc_wrapper = options.no_compile = True
         compiled = compiler.compile_extra(
             _typing_context(),
-            self.targetdescr.target_context,
+            _target_context(),
             self.py_func,
             args=args,
             return_type=return_type,
@@ -149,7 +220,7 @@ class _Compiler(_FunctionCompiler):  # type: ignore[misc]  # numba has no types
         compiled = self._compile_core(args, None, inner=True)
         compiled.library.__class__ = _InnerLibrary
         key = object()
-        self.targetdescr.target_context.insert_user_function(key, compiled.fndesc, [compiled.library])
+        _target_context().insert_user_function(key, compiled.fndesc, [compiled.library])
         return key, compiled.signature
 
 

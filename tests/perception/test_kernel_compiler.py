@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
@@ -13,8 +14,10 @@ import numba
 import numpy as np
 import pytest
 from numba.core import event
+from numba.core.base import BaseContext
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
+from numba.core.types.functions import BaseFunction
 
 from perception.kernel import Floats, kernel
 from runtime.support.child_process import child_environment
@@ -94,6 +97,48 @@ def test_an_error_in_a_kernel_for_kernels_names_it() -> None:
 
     with pytest.raises(numba.NumbaError, match="no_such_attribute"):
         calls_wrong(1.0)
+
+
+def test_what_numba_does_not_define_is_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    refreshed: list[None] = []
+    refresh = BaseContext.refresh
+
+    def noted(context: Any) -> None:
+        refreshed.append(None)
+        refresh(context)
+
+    @_uncached
+    @kernel
+    def rotated(values: Floats, i: int) -> float:
+        first = values[i]
+        values[i] = values[i + 1]
+        values[i + 1] = values[i + 2]
+        values[i + 2] = first
+        both: float = values[i] + values[i + 1]
+        return both
+
+    monkeypatch.setattr(BaseContext, "refresh", noted)
+    values = np.array([1.0, 2.0, 4.0])
+    assert (rotated(values, 0), values.tolist()) == (6.0, [2.0, 4.0, 1.0])
+    assert len(refreshed) <= 4, "once for each compilation and each new type, and not at each access to an array"
+
+
+def test_an_operator_is_resolved_once_for_the_same_types(monkeypatch: pytest.MonkeyPatch) -> None:
+    resolved = Counter[tuple[Any, ...]]()
+    resolve = BaseFunction.get_call_type
+
+    def noted(operator: Any, context: Any, args: tuple[Any, ...], kws: Any) -> Any:
+        resolved[operator.key, args] += 1
+        return resolve(operator, context, args, kws)
+
+    @_uncached
+    @kernel
+    def polynomial(x: float, y: float) -> float:
+        return x * y + x * x + y * y + x * x * y + 2.0 * x + 2.0 * y
+
+    monkeypatch.setattr(BaseFunction, "get_call_type", noted)
+    assert polynomial(2.0, 3.0) == 6.0 + 4.0 + 9.0 + 12.0 + 4.0 + 6.0
+    assert max(resolved.values(), default=0) <= 2, "to find all types, and to make code"
 
 
 LOADS: Final = """
