@@ -30,15 +30,15 @@ export UV_SYSTEM_CERTS ?= 1
 run: $(VENV)/run.stamp
 	@$(BIN)/echolocate run
 
-# All at once, so that no processor waits while something is fetched, or one of them collects its tests; each of the
-# others prints as it ends.
+# All at once, so that no processor waits while something is fetched, or one of them collects its tests. What runs beside
+# has a lower priority: the others begin with compiling in one process, and later leave gaps, as they wait for the clock.
 test:
 	@$(MAKE) --no-print-directory --silent --jobs=3 $(VENV)/test.stamp $(VENV)/npm.stamp $(VENV)/browser.stamp
 	@$(MAKE) --no-print-directory --jobs=3 compiled beside
 	@$(MAKE) --no-print-directory coverage
 
 beside: $(VENV)/test.stamp
-	@$(MAKE) --no-print-directory --output-sync=target boundscheck lint interpreted
+	@nice -n 5 $(MAKE) --no-print-directory --output-sync=target boundscheck lint interpreted
 
 # What answers within a minute while one edits: lint, types, and the tests of what changed since the last commit.
 check: lint

@@ -15,6 +15,7 @@ generates new ones), and the settings of the user's terminal are removed.
 
 from __future__ import annotations
 
+import functools
 import gc
 import os
 import signal
@@ -102,8 +103,7 @@ def pytest_collection() -> Generator[None, object, object]:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     promises.collect(config, items)
     for item in items:
-        has_kernels = any(item.path.is_relative_to(folder) for folder in KERNEL_TESTS)
-        if has_kernels:
+        if _is_in(item.path, *KERNEL_TESTS):
             item.add_marker("kernels")
     slow = slow_kernel_setting()
     if slow is None:
@@ -156,7 +156,13 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def _waits(item: pytest.Item) -> bool:
     """Return whether a test waits for the clock or the browser, which one or two processes share."""
-    return item.get_closest_marker("realtime") is not None or item.path.is_relative_to(BROWSER_TESTS)
+    return _is_in(item.path, BROWSER_TESTS) or item.get_closest_marker("realtime") is not None
+
+
+@functools.cache
+def _is_in(path: Path, *folders: Path) -> bool:
+    """Return whether a file of tests, of which many ask, is in one of these folders."""
+    return any(path.is_relative_to(folder) for folder in folders)
 
 
 def _load_kernels(session: pytest.Session) -> None:

@@ -16,7 +16,7 @@ from runtime.cli.standard_streams import is_open
 from runtime.support.child_process import child_environment
 
 FULL = Path("/dev/full")
-CHECK = "-m runtime.cli check hallway"
+SETTINGS = "-m runtime.cli settings"
 WRONG = "-m runtime.cli check nosuch"
 DEGREE = "from runtime.cli.standard_streams import *; open_standard_streams(); print('90°', '\\udcff')"
 """Prints what ASCII lacks, and the byte of a file name that is not UTF-8."""
@@ -33,7 +33,7 @@ def shell(redirection: str, arguments: str, **environment: str) -> subprocess.Co
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full, the device that is always full")
-@pytest.mark.parametrize("arguments", [CHECK, "-u -m runtime.cli --version"])
+@pytest.mark.parametrize("arguments", [SETTINGS, "-u -m runtime.cli --version"])
 def test_full_output_is_one_line_of_error(arguments: str, measured: Callable[[str], None]) -> None:
     done = shell(">/dev/full", arguments)
     assert done.returncode == FAILED
@@ -46,7 +46,7 @@ def test_full_output_is_one_line_of_error(arguments: str, measured: Callable[[st
 @pytest.mark.parametrize(
     ("redirection", "arguments", "code"),
     [
-        ("2>&- >&- <&-", CHECK, DONE),
+        ("2>&- >&- <&-", SETTINGS, DONE),
         pytest.param(
             "2>/dev/full", WRONG, WRONG_CALL, marks=pytest.mark.skipif(not FULL.exists(), reason="no device")
         ),
@@ -57,7 +57,7 @@ def test_a_stream_that_takes_nothing_changes_no_exit_code(redirection: str, argu
     assert (done.returncode, done.stdout, done.stderr) == (code, "", "")
 
 
-@pytest.mark.parametrize("arguments", ["-m runtime.cli settings", "-m runtime.cli --help"])
+@pytest.mark.parametrize("arguments", [SETTINGS, "-m runtime.cli --help"])
 def test_a_reader_that_has_what_it_wants_is_no_failure(arguments: str) -> None:
     read, write = os.pipe()
     os.close(read)
