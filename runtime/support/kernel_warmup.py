@@ -19,7 +19,6 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
-from perception.ring_faults.memory import LOOK_FIELDS
 from runtime.support.child_process import INTERPRETER, child_environment
 from runtime.support.kernel_cache import (
     BAYES,
@@ -96,6 +95,7 @@ def _ring(settings: Settings) -> None:
     from drivers.messages import Pose
     from perception.pipeline import Perception
     from perception.records import records, zeros
+    from perception.ring_faults.memory import LOOK_FIELDS
     from perception.ring_faults.wiring import LOOKS, Wiring, weigh_turn
     from perception.sensor_faults.memory import RingMemory, SensorMemory
     from perception.sensor_faults.silence import miss_share

@@ -37,6 +37,12 @@ from tests.inner_kernels import is_inner, kernels_named
 ROOT = Path(__file__).parents[3]
 
 
+def test_the_compiler_is_imported_only_where_kernels_are_prepared() -> None:
+    """It takes half a second, and reads the folder of its cache when it is imported: one beside the sources, then."""
+    program = "import sys, runtime.cli.app, runtime.support.kernel_warmup; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0
+
+
 def test_the_second_process_compiles_the_refinement_of_its_part(monkeypatch: pytest.MonkeyPatch) -> None:
     """A call on an empty memory compiles and does nothing."""
     asked = []
