@@ -238,6 +238,9 @@ class _Child:
             self._sender.send((self._index, DONE))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Send a report to the parent."""
+        """Send a report to the parent, but that of a passed setup or teardown, of which only the time is shown."""
         config = self._session.config
+        options = config.option
+        if report.passed and report.when != "call" and options.durations is None and options.xmlpath is None:
+            return
         self._sender.send((self._index, config.hook.pytest_report_to_serializable(config=config, report=report)))

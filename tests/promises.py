@@ -300,9 +300,10 @@ def tests_of(items: Iterable[pytest.Item]) -> tuple[PromiseTest, ...]:
     """
     found: dict[str, PromiseTest] = {}
     for item in items:
-        ids = tuple(dict.fromkeys(one for mark in item.iter_markers(PROMISE) for one in mark.args))
+        marks = [*item.iter_markers(PROMISE)]
+        ids = tuple(dict.fromkeys(one for mark in marks for one in mark.args))
         unknown = [one for one in ids if one not in PROMISES]
-        if unknown or (not ids and item.get_closest_marker(PROMISE) is not None):
+        if unknown or (marks and not ids):
             named = ", ".join(map(repr, unknown)) or "no ID"
             raise pytest.UsageError(
                 f"{item.nodeid}: @pytest.mark.promise names {named}; known IDs: {', '.join(PROMISES)}; "
