@@ -182,17 +182,15 @@ def remember(
 
 
 @kernel
-def find_ahead(
-    pose: RingPose, length: float, half_width: float, echoes: Records[RememberedEcho], found: Floats
-) -> int:
+def find_ahead(pose: RingPose, half_width: float, echoes: Records[RememberedEcho], found: Floats) -> int:
     """Find the echoes ahead; return how many there are.
 
     Parameters
     ----------
     pose : RingPose
         The robot's, m and rad, turned into the direction in which it drives.
-    length, half_width : float
-        Length and half the width of the way ahead, m.
+    half_width : float
+        Half the width of the way ahead, m.
     echoes
         As for `remember`.
     found : (REMEMBERED_PLACES, 2) float
@@ -203,7 +201,7 @@ def find_ahead(
     count = 0
     for k in range(len(echoes)):
         dx, dy = echoes[k].x - x, echoes[k].y - y
-        if echoes[k].is_kept and 0.0 < c * dx + s * dy < length and abs(c * dy - s * dx) < half_width:
+        if echoes[k].is_kept and c * dx + s * dy > 0.0 and abs(c * dy - s * dx) < half_width:
             found[count, 0], found[count, 1] = echoes[k].x, echoes[k].y
             count += 1
     return count
@@ -243,11 +241,11 @@ class RememberedEchoes:
         of = (self._sensor_of, self._echo_records, self._heard_records)
         remember(ranges_m, mounts, pose, robot_s, reception, agreed, *of)
 
-    def ahead(self, pose: Pose, length_m: float, half_width_m: float) -> Floats:
+    def ahead(self, pose: Pose, half_width_m: float) -> Floats:
         """Return the places within the way ahead, shape (k, 2), m."""
         found = np.empty((REMEMBERED_PLACES, 2))
         place = (float(pose.x), float(pose.y), float(pose.theta))
-        return found[: find_ahead(place, length_m, half_width_m, self._echo_records, found)]
+        return found[: find_ahead(place, half_width_m, self._echo_records, found)]
 
     def clear(self) -> None:
         """Forget all echoes, and what has heard."""

@@ -20,8 +20,6 @@ CREEP_M_S: Final = 0.04
 """Speed that is always left, m/s: most of what falls silent is a mirror that left the beam, and a bumper bears it."""
 LOST_AHEAD_M: Final = 0.4
 """A ring that hears nothing nearer than this to the clearance before what it heard must have failed, m."""
-REMEMBERED_M: Final = 0.5
-"""What is remembered farther ahead of the clearance limits no speed yet, m: from .3 m/s it stops in .15 m."""
 LOST: Final = (
     "the ring hears nothing new, not even what it heard a moment ago: the robot drives slowly until it does; beside "
     "smooth walls that is so for moments, but if it lasts, check the ring's power and cables"
@@ -100,8 +98,7 @@ def limit_unheard(
 def _limit_ahead(pose: Pose, percept: Percept, unheard: UnheardEchoes, settings: Settings) -> tuple[float, str]:
     """Return the speed from which a robot stops before what was lost in the direction of a pose, m/s, and why."""
     body, arbiter, limit, reason = settings.body, settings.behaviors.arbiter, math.inf, UNHEARD
-    reach_m = body.radius_m + arbiter.clearance_m
-    remembered = unheard.remembered.ahead(pose, reach_m + REMEMBERED_M, reach_m)
+    remembered = unheard.remembered.ahead(pose, body.radius_m + arbiter.clearance_m)
     if len(points := np.concatenate([unheard.points(), remembered])):
         ahead = Percept(pose, points, percept.field_of_view)
         limit = stoppable_speed_m_s(ahead, body, arbiter.clearance_m, arbiter.cautious_velocity_m_s)

@@ -111,7 +111,7 @@ def _ring(settings: Settings) -> None:
     perception.steady_obstacles(0.1 * WARM_UP_FIRINGS, 1.0, Pose(0.0, 0.0, 0.0))
     perception.unheard.take_ahead(Pose(0.0, 0.0, 0.0), 1.0, 1.0)
     perception.unheard.points()
-    perception.unheard.remembered.ahead(Pose(0.0, 0.0, 0.0), 1.0, 1.0)
+    perception.unheard.remembered.ahead(Pose(0.0, 0.0, 0.0), 1.0)
     perception.ring_monitor.possible_obstacles()
 
 

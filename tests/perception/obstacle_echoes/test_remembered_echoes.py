@@ -37,7 +37,7 @@ class Drive:
             self.ring.update(Firing(self.t, Pose(x, 0.0, yaw), yaw, ranges))
 
     def ahead(self, pose: Pose = AHEAD) -> list[tuple[float, float]]:
-        found = self.ring.unheard.remembered.ahead(pose, 2.0, 0.3)
+        found = self.ring.unheard.remembered.ahead(pose, 0.3)
         return [(round(x, 3), round(y, 3)) for x, y in found.tolist()]
 
 
@@ -133,8 +133,8 @@ def test_the_oldest_makes_room() -> None:
 def test_a_snapshot_keeps_it_and_a_reset_forgets_it() -> None:
     drive, other = heard_behind(), FreshEchoes(MOUNTS, BEAM, (), REACH_M)
     put_back(other, snapshot_of(drive.ring))
-    kept = drive.ring.unheard.remembered.ahead(AHEAD, 2.0, 0.3)
+    kept = drive.ring.unheard.remembered.ahead(AHEAD, 0.3)
     assert len(kept) == 1
-    np.testing.assert_array_equal(other.unheard.remembered.ahead(AHEAD, 2.0, 0.3), kept)
+    np.testing.assert_array_equal(other.unheard.remembered.ahead(AHEAD, 0.3), kept)
     drive.ring.clear()
     assert drive.ahead() == []
