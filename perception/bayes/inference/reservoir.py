@@ -2,7 +2,8 @@
 
 Hits and silences share the bins, so that new silences replace the hits of an object that has gone, for each bearing
 from which the robot observes it again. No reading is dropped for its age. Readings of one bearing never replace those
-of another, because a position needs readings from many bearings.
+of another, because a position needs readings from many bearings. What ended in front of an established model says
+little of it, and takes free places only (`has_room`): from afar, among furniture, most readings do.
 
 Cross paths come eight at a time and would fill a circle's bins with the last decimetre, so that one in a few is kept
 there, for good. All circles share one memory of the others, of the last metre or two, and each takes those that it
@@ -44,6 +45,13 @@ def copy_reading(source: Reading, target: Reading) -> None:
 
 
 @kernel
+def bin_of(track: CircleTrack | PolygonTrack, cx: float, cy: float, reading: Reading) -> int:
+    """Return the bearing bin of a reading; the parameters are those of `keep_reading`."""
+    bins = len(track.bins)
+    return int((math.atan2(reading.y - cy, reading.x - cx) / math.tau + 0.5) * bins) % bins
+
+
+@kernel
 def keep_reading(track: CircleTrack | PolygonTrack, cx: float, cy: float, reading: Reading) -> None:
     """Put a reading into a track's reservoir; it replaces the oldest reading of a full bearing bin.
 
@@ -56,11 +64,16 @@ def keep_reading(track: CircleTrack | PolygonTrack, cx: float, cy: float, readin
     reading : Reading
         Copied.
     """
-    bins = track.bins
-    b = int((math.atan2(reading.y - cy, reading.x - cx) / math.tau + 0.5) * len(bins)) % len(bins)
-    readings = bins[b].readings
-    copy_reading(reading, readings[bins[b].count % len(readings)])
-    bins[b].count += 1
+    bin_ = track.bins[bin_of(track, cx, cy, reading)]
+    copy_reading(reading, bin_.readings[bin_.count % len(bin_.readings)])
+    bin_.count += 1
+
+
+@kernel
+def has_room(track: CircleTrack, cx: float, cy: float, reading: Reading) -> bool:
+    """Return whether a reading's bearing bin is not full; the parameters are those of `keep_reading`."""
+    bin_ = track.bins[bin_of(track, cx, cy, reading)]
+    return bool(bin_.count < len(bin_.readings))
 
 
 @kernel

@@ -14,7 +14,7 @@ from perception.bayes.inference.lines import update_lines
 from perception.bayes.inference.noise_estimation import add_roughness, choose_noise, noise_variance, tolerance_m
 from perception.bayes.inference.occlusion import is_elsewhere
 from perception.bayes.inference.placement import COORDINATE_MAX_M, place_readings
-from perception.bayes.inference.reservoir import copy_reading, keep_reading
+from perception.bayes.inference.reservoir import copy_reading, has_room, keep_reading
 from perception.bayes.memory.elements import CROSS_EVERY, CROSS_HISTORY, HISTORY, Reading
 from perception.bayes.memory.parameters import (
     ASSOCIATION_MARGIN_M,
@@ -119,8 +119,18 @@ def bears_on_circle(
 
 
 @kernel
+def is_in_front(q: Reading, cx: float, cy: float, radius: float, p: SettingsRecord) -> bool:
+    """Return whether an echo came from in front of a circle, by more than the gate; parameters as above."""
+    return bool(not is_crossed(q) and q.range_m < math.hypot(cx - q.x, cy - q.y) - radius - p[0].gate_m)
+
+
+@kernel
 def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int) -> None:
     """Put each fired reading into the reservoirs of the circles that it bears on, of the cross paths a few.
+
+    What ends in front of an established model, at something unknown, takes a free place there but replaces nothing:
+    heard from afar among furniture, such readings would take the places of its echoes, until it ends. Other circles
+    go on losing to them, as most of what seems round in a corridor must.
 
     The others do not make a sure circle due for refinement: eight at a time, they would several times in a metre, and
     with each its name would be at stake anew, on readings that say the same.
@@ -139,6 +149,7 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
             continue
         track.idle_firings += 1
         is_sure = track.is_named == 1 and track.probability >= CERTAIN_PROBABILITY
+        is_model = track.status == ESTABLISHED and track.kind < p[0].model_count
         cx = track.x
         cy = track.y
         for i in range(m + s[0].scratch.crosses):
@@ -149,6 +160,8 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
                 is_own = not is_elsewhere(tracks[owner], p, cx, cy, track.radius)
             if bears_on_circle(q, cx, cy, track.radius, s[0].rays, owner == UNEXPLAINED, is_own, p):
                 is_kept = i < m or (i + offset) % CROSS_EVERY == 0
+                if is_model and is_in_front(q, cx, cy, track.radius, p) and not has_room(track, cx, cy, q):
+                    continue
                 if is_kept:
                     keep_reading(track, cx, cy, q)
                 if is_kept or not is_sure:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY
 from perception.bayes.memory.scratch import ON_LINE, UNEXPLAINED
-from perception.bayes.memory.state import ESTABLISHED, FREE
+from perception.bayes.memory.state import ESTABLISHED, FREE, TENTATIVE
 from perception.bayes.tracks import observe
 from tests import naive_occlusion, naive_tracks
 from tests.naive_tracks import rows
@@ -85,6 +86,29 @@ def test_readings_go_to_the_circle_with_the_least_error_and_every_circle_they_be
             kept += n
     assert taken > 2 * examples
     assert kept > 7 * examples
+
+
+@pytest.mark.parametrize(("kind", "status", "range_m", "entered"), [
+    (0, ESTABLISHED, 1.0, 0), (0, TENTATIVE, 1.0, 3), (1, ESTABLISHED, 1.0, 3), (0, ESTABLISHED, 3.0, 3),
+    (0, ESTABLISHED, 2.0, 3),
+], ids=["in front", "in front of what is tentative", "in front of a rival", "passed", "hit"])  # fmt: skip
+def test_a_reading_that_ends_in_front_of_an_established_model_replaces_none(
+    kind: int, status: int, range_m: float, entered: int
+) -> None:
+    memory = new_memory()
+    track, counts = memory.tracks[0], memory.circles["bins"]["count"][0]
+    track.kind, track.status, track.radius = kind, status, S.circles[kind].radius_m
+    track.x = 2.0 + track.radius
+    numbers(memory.state["scratch"]["fired"][0])[:1, :5] = (0.0, 1e-3, 1.0, 0.0, range_m)
+    memory.state["scratch"]["explained_by"][0, 0] = UNEXPLAINED
+    for _ in range(BIN_CAPACITY):
+        observe.keep_readings(memory.s, memory.tracks, P, 1)
+    assert counts.max() == counts.sum() == track.unseen == BIN_CAPACITY  # each takes a free place
+    track.idle_firings = 7
+    for _ in range(3):
+        observe.keep_readings(memory.s, memory.tracks, P, 1)
+    assert counts.sum() - BIN_CAPACITY == track.unseen - BIN_CAPACITY == entered
+    assert track.idle_firings == (0 if entered else 7 + 3)
 
 
 def test_the_surest_unexplained_segment_in_reach_is_proposed_first() -> None:
