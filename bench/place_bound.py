@@ -23,8 +23,8 @@ from drivers.messages import Firing, Floats, Pose, wrap_angle
 from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.localization.known_room.known_room import KnownRoom
 from perception.localization.known_room.mixed_reflection import LATE_M, WILD_HEARD
+from perception.localization.known_room.particle_update import TEMPER
 from perception.localization.known_room.pose_grid import GRID_CELL_M, GRID_DROPOUT, SIGMA_M, SIGMA_SHARE, WILD_MIN
-from perception.localization.known_room.pose_particles import TEMPER
 from perception.localization.localized_pose import Status
 from perception.localization.room.expected_ranges import Beams, Reflection, expected_ranges
 from perception.localization.room.range_likelihood import HEARD_PRIOR

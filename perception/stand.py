@@ -19,7 +19,6 @@ from perception.constant_depth import constant_depths
 from perception.echo_kind import EchoKind, echo_kind
 from perception.kernel import Floats
 from perception.sensor_mounts import mounts_array, mounts_at
-from perception.shared_numbers import OUTLIER_SIGMAS
 
 STAND_STILL_M: Final = 2e-3
 """A robot whose odometry shifts by less than this, and turns by less than `STILL_RAD`, stands."""
@@ -34,6 +33,8 @@ UNKNOWN_NOISE_M: Final = 1e-3
 """Standard deviation of a range where no path was heard often enough to know it."""
 REPEATS_MIN: Final = 3
 """Readings of a path from which on they show the noise."""
+ONE_SURFACE_MISFIT_MAX: Final = 9.0
+"""Mean square of the residuals, in their variance, above which the readings are not those of one surface."""
 
 
 class StandSurface(NamedTuple):
@@ -47,7 +48,7 @@ class StandSurface(NamedTuple):
     @property
     def is_one(self) -> bool:
         """Whether the readings fit one surface; the odds mean nothing otherwise."""
-        return self.echo.misfit <= OUTLIER_SIGMAS**2
+        return self.echo.misfit <= ONE_SURFACE_MISFIT_MAX
 
     @property
     def kind(self) -> str:

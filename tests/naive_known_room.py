@@ -9,8 +9,7 @@ import numpy as np
 
 from perception.kernel import Floats
 from perception.localization.known_room.mixed_reflection import LATE_M, WILD_HEARD
-from perception.localization.known_room.particle_update import FIT_STEPS
-from perception.localization.known_room.pose_particles import TEMPER
+from perception.localization.known_room.particle_update import FIT_STEPS, TEMPER
 from perception.localization.known_room.surroundings import FRINGE_RAD
 from perception.localization.room.expected_ranges import Beams, Reflection, expected_ranges
 from perception.localization.room.range_likelihood import HEARD_PRIOR, RangeModel

@@ -25,6 +25,7 @@ from perception.bayes.inference.kernel_settings import (
 )
 from perception.bayes.memory.elements import MAX_POLYGONS
 from perception.bayes.memory.job_records import NO_JOB, REFINEMENT
+from perception.bayes.memory.polygon_parameters import POLYGON_PROBABILITY
 from perception.bayes.memory.state import ESTABLISHED, FREE, Memory
 from perception.bayes.memory.state_migration import migrate
 from perception.bayes.polygons.association import associate_polygons
@@ -70,7 +71,6 @@ from perception.kernel import Floats
 from perception.map_moves import MapMoves
 from perception.records import records, zeros
 from perception.sensor_mounts import mounts_array, mounts_at, ring_pose
-from perception.shared_numbers import LIKELY
 from perception.snapshot import bounds_of
 
 
@@ -232,7 +232,7 @@ class BayesPerception:
     @property
     def _sure_polygon(self) -> float:
         """Least probability with which a polygon is reported."""
-        return min(self._config.report_probability, LIKELY)
+        return min(self._config.report_probability, POLYGON_PROBABILITY)
 
     def _sure_objects(self) -> tuple[DetectedObject, ...]:
         """Return the models that are reported, best first; an unchanged circle is the same object as before."""

@@ -22,13 +22,15 @@ from perception.angles import SAME_RAD, wrapped
 from perception.bounds import FINITE, POSITIVE, Bound, Flag, Place
 from perception.kernel import Floats, kernel
 from perception.records import Record, Records
-from perception.ring_faults.memory import LEADS_M, EchoTrace
+from perception.ring_faults.memory import EchoTrace
 from perception.sensor_faults.wall import NOISE_SHARE
 
 NO_CHANGE, LENGTHENED, EXCHANGED = range(3)
 """The changes; see the module."""
 NOISE_M: Final = 0.02
 """Noise of a range that is no share of it, m."""
+ROUND_M: Final = 0.5
+"""A sensor that moved farther since its reading before is not compared, m."""
 WINDOW_MIN_M: Final = 1e-3
 """A window of ranges is at least as wide, m."""
 TURNING_SHARE: Final = 0.25
@@ -173,7 +175,7 @@ def compare(
         if one.source < 0:
             continue
         r, then = echoes[i].latest.range_m, echoes[one.source].before
-        if math.hypot(echoes[i].latest.x - then.x, echoes[i].latest.y - then.y) > LEADS_M:
+        if math.hypot(echoes[i].latest.x - then.x, echoes[i].latest.y - then.y) > ROUND_M:
             one.source = -1
             continue
         one.low, one.high = expect(one.source, i, 0.0, half_angle, tolerance, mounts, echoes)

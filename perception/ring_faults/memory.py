@@ -9,6 +9,8 @@ from perception.bounds import FINITE, PLACE, POSITIVE, Count, Flag, Place
 from perception.kernel import Floats, kernel
 from perception.records import Record
 
+NO_ECHO_M: Final = -1.0
+"""In place of the range of a reading without an echo, m."""
 HALVES: Final = 2
 """Parts of the ring that may fail by themselves: all of it, and what looks ahead."""
 QUARTERS: Final = 3
@@ -18,26 +20,12 @@ LOOK_KINDS: Final = 4
 EVIDENCE_NAT: Final = math.log(1e7 / 0.002)
 """A sum of evidence that convicts the ring, nat: a day has some 10⁷ readings, and at most two days in a
 thousand are to have a false alarm. In 40 hours of simulated honest drives the greatest sum was 19.5."""
-HUNDREDFOLD_NAT: Final = math.log(100.0)
-"""Evidence of a reading that repeats what it should have changed, by `repeats.STEP_MIN_M` or three tolerances, and of
-a whole turn in place that suffices: there is one in a run, before its first drive. In 192 honest turns of four rings,
-among mirrors and where everything echoes, none is accused; of 576 with one fault 568 are named rightly, all 288 among
-them in rooms that were in view of no choice; two are named as another fault, six not."""
-LEADS_M: Final = 0.5
-"""A known echo leads to expect the next one, may be ahead and is compared within this way of the ring, m. With .2 an
-`amigo` that is turned by a half touches something at .2 m/s."""
-TURNED_SHARE: Final = 0.5
-"""Echoes are compared while the sensor has turned by no more than this share of half its beam. With .2 a `hobby8`
-that is turned by a half touches something at .3 m/s in a corridor; with .35 looks of a whole turn, half a beam apart,
-of three sensors 25° apart fell between each other's: 16 of 24 exchanges were named, and 24 with this."""
-LOOK_FIELDS: Final = 4
-"""Of a look that is kept: a place x, y (m), a direction (rad) and a range (m; below zero without an echo)."""
 MOVES: Final = 1.2
 """A reading changes by no more than this times the sensor's motion; rough walls that the beam grazes change more."""
 
 
 Look: TypeAlias = tuple[float, float, float, float]
-"""A reading (m; `NO_RANGE` without an echo), the sensor's place (x, y, m), and its axis (rad)."""
+"""A reading (m; `NO_ECHO_M` without an echo), the sensor's place (x, y, m), and its axis (rad)."""
 Reception: TypeAlias = tuple[float, float, float]
 """Half the beam's width (rad), the difference of equal readings (m), and how far the ring listens (m)."""
 
@@ -46,7 +34,7 @@ class SensorPlace(Record):
     """Where a sensor was at a reading, in the odometry's frame."""
 
     range_m: Annotated[float, PLACE]
-    """The reading, m; `NO_RANGE` without an echo."""
+    """The reading, m; `NO_ECHO_M` without an echo."""
     x: Place
     """Place of the sensor, m."""
     y: Place

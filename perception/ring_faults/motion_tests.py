@@ -24,9 +24,9 @@ from perception.ring_faults.changes import (
 from perception.ring_faults.memory import (
     EVIDENCE_NAT,
     HALVES,
-    LEADS_M,
     LOOK_KINDS,
     MOVES,
+    NO_ECHO_M,
     QUARTERS,
     EchoTrace,
     Look,
@@ -43,7 +43,6 @@ from perception.ring_faults.repeats import (
 from perception.ring_faults.replays import PAST_LOOKS, PastLooks, weigh_replay
 from perception.sensor_faults.wall import NOISE_SHARE
 from perception.sensor_mounts import RingPose
-from perception.shared_numbers import NO_RANGE
 
 CHANGE_NAT: Final = math.log(3e5 / 0.002)
 """`EVIDENCE_NAT` for changes from one round of the firing pattern to the next, of which a day has 3·10⁵, nat."""
@@ -54,6 +53,8 @@ RESTART_M: Final = 0.25
 AHEAD_COS: Final = math.cos(math.radians(100.0))
 """Sensors within 100° of the direction of travel look ahead: what the robot may drive into, and both its sides."""
 
+LEADS_M: Final = 0.5
+"""A known echo leads to expect the next one within this way of the ring, m."""
 REACH_SHARE: Final = 0.8
 """What is expected beyond this share of the ring's reach may be out of reach next time."""
 MISSED: Final = 0.9
@@ -264,7 +265,7 @@ def check_motion(
         past.counts[:] = 0
         for i in range(len(echoes)):
             echoes[i].is_known = echoes[i].is_compared = echoes[i].is_anchored = echoes[i].agreed = 0
-            echoes[i].heard.range_m = echoes[i].agreed_m = NO_RANGE
+            echoes[i].heard.range_m = echoes[i].agreed_m = NO_ECHO_M
     elif moved > 0.0:
         all_of.travel_rad = math.atan2(y - all_of.y, x - all_of.x)
         all_of.path_m += moved
@@ -274,7 +275,7 @@ def check_motion(
     for i in range(ranges.shape[0]):
         if math.isnan(ranges[i]):
             continue
-        r = ranges[i] if ranges[i] < reach - tolerance else NO_RANGE
+        r = ranges[i] if ranges[i] < reach - tolerance else NO_ECHO_M
         own_x = x + c * mounts[i, 0] - s * mounts[i, 1]
         own_y = y + s * mounts[i, 0] + c * mounts[i, 1]
         axis = yaw + mounts[i, 2]
@@ -286,7 +287,7 @@ def check_motion(
         learn_noise(echoes[i], r, x, y, axis, tolerance, all_of)
         look = (r, own_x, own_y, axis)
         weigh_repeat(i, look, yaw, is_ahead, mounts, reception, echoes, ring)
-        heard_before = echoes[i].before.range_m if echoes[i].is_compared else NO_RANGE
+        heard_before = echoes[i].before.range_m if echoes[i].is_compared else NO_ECHO_M
         nats = weigh_replay(i, look, heard_before, reception, past)
         replayed = max(replayed, nats)
         weigh_look(i, look, is_ahead, reception, echoes, all_of)

@@ -20,10 +20,8 @@ from perception.kernel import Floats, kernel
 from perception.records import Records
 from perception.ring_faults.memory import (
     EVIDENCE_NAT,
-    LEADS_M,
     MOVES,
     QUARTERS,
-    TURNED_SHARE,
     EchoTrace,
     Look,
     Reception,
@@ -42,6 +40,9 @@ DOUBTED_NAT: Final = 2.0
 Honest rings that wind by ±9° to ±20° through corridors gather up to 1.2; a `magellan` along and into corridors up to
 2.3, for a moment, in 5 of 363 drives. Of 120 drives of turned rings 3 touch something above .05 m/s, with 2.5 nat 5,
 with 3 nat 7."""
+ECHO_KEPT_M: Final = 0.5
+"""Way of the ring for which an echo is kept as what may be ahead, m. With .2 an `amigo` that is turned by
+a half touches something at .2 m/s."""
 FOLLOWS: Final = 0.7
 """Share of an honest ring's changes that follow the motion; the others come from surfaces that change places."""
 ALIKE: Final = 2.5
@@ -50,6 +51,9 @@ Beams that overlap are counted apart."""
 LEAN_RAD: Final = 0.35
 """A wall that leans to the path by up to this changes the ranges of sensors that graze it as nothing else does, rad:
 robots wind. With .25 honest rings that wind by up to ±20° show 3 nat or more in 28 of 100 looks, with .35 in none."""
+TURNED_SHARE: Final = 0.5
+"""Echoes are compared while the sensor has turned by no more than this share of half its beam. With .2 a `hobby8`
+that is turned by a half touches something at .3 m/s in a corridor."""
 STRAIGHT_SHARE: Final = 0.2
 """The same for evidence that the ring is turned: in a beam that turns, a wall that it grazes changes its range by the
 cotangent of the angle. With .5 honest rings that wind by up to ±20° show 3 nat or more in 5 of 100 looks."""
@@ -153,7 +157,7 @@ def possible_places(mounts: Floats, echoes: Records[EchoTrace], ring: Records[Ri
         c, s = math.cos(0.5 * math.pi * quarter), math.sin(0.5 * math.pi * quarter)
         for i in range(len(echoes)):
             heard = echoes[i].heard
-            if heard.range_m < 0.0 or not echoes[i].is_known or all_of.path_m - heard.path_m > LEADS_M:
+            if heard.range_m < 0.0 or not echoes[i].is_known or all_of.path_m - heard.path_m > ECHO_KEPT_M:
                 continue
             yaw = heard.axis - mounts[i, 2]
             dx = math.cos(yaw) * mounts[i, 0] - math.sin(yaw) * mounts[i, 1]

@@ -9,14 +9,16 @@ from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.records import Records
 from perception.ring_faults.changes import TURNING_SHARE
-from perception.ring_faults.memory import HUNDREDFOLD_NAT, EchoTrace, Look, Reception, RingTrace, SensorPlace, mark
+from perception.ring_faults.memory import EchoTrace, Look, Reception, RingTrace, SensorPlace, mark
+from perception.sensor_faults.monitor import TOLERANCE_MIN_M
 from perception.sensor_faults.wall import NOISE_SHARE, towards_wall
-from perception.shared_numbers import TOLERANCE_MIN_M
 
 REPEAT_M: Final = TOLERANCE_MIN_M
 """Readings that differ by no more repeat each other, m: what is old may come with noise of a few millimetres."""
+REPEAT_NAT: Final = math.log(100.0)
+"""Evidence of a reading that repeats what it should have changed by `STEP_MIN_M` or three tolerances."""
 STEP_MIN_M: Final = 0.06
-"""See `HUNDREDFOLD_NAT`, m: ten times the error of a short way's odometry and of a range in steps of a millimetre."""
+"""See `REPEAT_NAT`, m: ten times the error of a short way's odometry and of a range in steps of a millimetre."""
 REPEATS_MAX: Final = 3.0
 """Such changes of one sensor that count for the ring: a single sensor may be stuck, and needs more to be named."""
 CHATTER_SHARE: Final = 0.002
@@ -29,7 +31,7 @@ NOISY_NAT: Final = math.log(0.5 / 0.02)
 half do so with noise, and two of a hundred without, as what is there may move."""
 EQUAL_NAT: Final = math.log(0.5 / 0.98)
 """Evidence for noise of a reading that did not change so, nat."""
-SENSOR_NAT: Final = REPEATS_MAX * HUNDREDFOLD_NAT
+SENSOR_NAT: Final = REPEATS_MAX * REPEAT_NAT
 """Greatest evidence of a sensor, nat."""
 WINDING_NAT: Final = math.log(1.0 / 0.05)
 """Evidence of a reading that is equal to the bit although the robot winds, nat. Of 9,321 such looks in 36 honest
@@ -323,7 +325,7 @@ def weigh_own_repeat(
     is_wall = has_moved and not is_turned and may_be_wall(i, r, way, yaw, mounts, reception, echoes, path_m)
     if is_wall:
         mark(c.own, c.own.range_m, x, y, axis, path_m)
-    due = HUNDREDFOLD_NAT * changes_due(i, look, c.own, yaw, mounts, reception, echoes, path_m)
+    due = REPEAT_NAT * changes_due(i, look, c.own, yaw, mounts, reception, echoes, path_m)
     more = 0.0
     if r == c.own.range_m and winds(c, reception[1]):
         more = WINDING_NAT
@@ -386,7 +388,7 @@ def weigh_repeat(
         c.standstill, c.repeated_nat, c.equal_nat = all_of.standstill, 0.0, 0.0
         mark(c.repeated, r, x, y, axis, all_of.path_m)
     elif r >= 0.0:
-        due = HUNDREDFOLD_NAT * changes_due(i, look, c.repeated, yaw, mounts, reception, echoes, all_of.path_m)
+        due = REPEAT_NAT * changes_due(i, look, c.repeated, yaw, mounts, reception, echoes, all_of.path_m)
         is_equal = r == c.repeated.range_m and winds(c, tolerance)
         c.stuck_nat = max(c.stuck_nat, due)  # nothing else ahead has changed either
         due = min(max(due, c.repeated_nat + (WINDING_NAT if is_equal else 0.0)), SENSOR_NAT)

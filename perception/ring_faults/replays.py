@@ -17,6 +17,8 @@ from perception.ring_faults.repeats import STEP_MIN_M
 
 PAST_LOOKS: Final = 64
 """Looks of each sensor that are kept: 10 to 25 s of the shipped rings."""
+PAST_FIELDS: Final = 4
+"""Range (m; below zero without an echo), place x, y (m) and direction (rad) of a look."""
 DIFFERS: Final = 0.05
 """Share of a replay's readings that differ from those of the lag before, as where it begins anew."""
 
@@ -25,7 +27,7 @@ class PastLooks(NamedTuple):
     """The last looks of each sensor, and how far the ring repeats them."""
 
     looks: Floats
-    """(n, PAST_LOOKS, LOOK_FIELDS): the looks, the oldest overwritten first."""
+    """(n, PAST_LOOKS, PAST_FIELDS): the looks, the oldest overwritten first."""
     counts: Ints
     """(n,): looks of each sensor so far."""
     replayed_nat: Floats

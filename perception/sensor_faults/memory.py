@@ -16,15 +16,14 @@ SETS_MAX: Final = 32
 """Sets of sensors that fire together that are distinguished; a firing pattern has at most 24."""
 
 
-RECOVERY_READINGS: Final = 5
-"""Readings below the least range, less the others, that are a fault, as many others clear it; and consecutive
-readings away from the stuck value that clear a stuck sensor."""
+TOO_NEAR_READINGS: Final = 5
+"""Readings below the least range, less the others, that are a fault; as many others clear it."""
 RANGE_OR_NONE: Final = PLACE._replace(infinite=True)
 """Of a range; infinite where nothing was heard, or nothing is known yet."""
 
 
 LOOKS_KEPT: Final = 16
-"""Looks of each sensor that are kept, `READING_M` or half a beam apart: a turn by 90°, or 1.6 m."""
+"""Looks of each sensor that are kept, `silence.LOOKS_APART_M` or half a beam apart: a turn by 90°, or 1.6 m."""
 
 
 class NeighbourCounts(Record):
@@ -33,7 +32,7 @@ class NeighbourCounts(Record):
     changes: Count
     """Changes of the steady reading."""
     leaps: Count
-    """Those by more than `SAME_ECHO_M`."""
+    """Those by more than `LEAP_M`."""
 
 
 class SensorLook(Record):
@@ -83,7 +82,7 @@ class SensorMemory(Record):
     """The value it is stuck at, m."""
     off_stuck: Count
     """Consecutive readings away from that value."""
-    too_near: Annotated[int, up_to(RECOVERY_READINGS)]
+    too_near: Annotated[int, up_to(TOO_NEAR_READINGS)]
     """Readings below the least range, less the others."""
     faults: Annotated[int, up_to(STUCK | SILENT | FAILING | CROSSTALK | TOO_NEAR)]
     """Fault bits of `perception.sensor_faults.report`."""

@@ -42,7 +42,6 @@ from perception.sensor_faults.reading_tests import FAULTS_CHANGED, LESS_POSSIBLE
 from perception.sensor_faults.report import SILENT, STUCK, SensorReport, describe_fault
 from perception.sensor_faults.silence import miss_share
 from perception.sensor_mounts import mounts_array, ring_pose
-from perception.shared_numbers import TOLERANCE_MIN_M
 
 NEIGHBOUR_MAX_RAD: Final = math.radians(31.0)
 """Largest angle between neighbours' axes, two places of a ring of 24 and some slack; beyond it sensors see different
@@ -52,6 +51,8 @@ NEAR_SHARE: Final = 0.45
 beam measures up to 2.2 times as far as its neighbour 15° nearer to the wall."""
 LEAST_SHARE: Final = 0.95
 """What is below this share of the least range cannot be measured: temperature changes ranges by at most 5 %."""
+TOLERANCE_MIN_M: Final = 0.005
+"""Least tolerance for equal readings, for rings that do not quantise."""
 TOLERANCE_STEPS: Final = 1.1
 """Tolerance for equal readings in steps of the ring's quantisation: one step and some rounding."""
 

@@ -15,30 +15,35 @@ from numpy.typing import NDArray
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
 from perception.sensor_faults.crosstalk import count_short_readings, find_set, is_doubtful
-from perception.sensor_faults.memory import RECOVERY_READINGS, RingMemory, RingSetup, SensorMemory
+from perception.sensor_faults.memory import TOO_NEAR_READINGS, RingMemory, RingSetup, SensorMemory
 from perception.sensor_faults.report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
 from perception.sensor_faults.silence import weigh_silence
 from perception.sensor_faults.turning import follow_turn, repeats_through_turn
 from perception.sensor_faults.wall import NOISE_SHARE, is_along_wall
 from perception.sensor_mounts import RingPose
-from perception.shared_numbers import SAME_ECHO_M
 
 # The thresholds below were tuned on the simulated halls of tests/perception/sensor_faults/test_monitor.py: no healthy
 # sensor is masked in any hall, and every faulty one is found.
 
 APPROACH_MIN_M: Final = 1.0
-"""Stuck: the base has come at least this much nearer to the reflecting surface, wherever in the beam it is, or has
-moved twice as far past it, m."""
+"""Stuck: the base has come at least this much nearer to the reflecting surface, wherever in the beam it is, m."""
 EQUAL_READINGS_MIN: Final = 20
-"""Stuck after approaching: at least so many equal readings, as fewer occur by chance; twice as many after passing
-by."""
+"""Stuck after approaching: at least so many equal readings; fewer occur by chance."""
 NEIGHBOUR_CHANGES_MIN: Final = 4
 """Stuck: the reading of either neighbour has changed this often in the meantime. If the base has only passed by, the
 readings must have leapt instead: a rough wall along the path gives equal readings to all sensors that face it."""
+PASSED_MIN_M: Final = 2.0
+"""Stuck after passing by: the base has moved at least this far, m."""
+PASSED_READINGS_MIN: Final = 40
+"""Stuck after passing by: at least so many equal readings."""
 PASSED_CHANGES_MIN: Final = 12
 """Stuck after passing by: changes of either neighbour's reading that count even without leaps."""
+LEAP_M: Final = 0.3
+"""A change of the reading by more than this is a leap, m."""
 REGULARITY_MIN: Final = 0.8
 """Below this regularity the sets do not recur, and crosstalk is not tested."""
+RECOVERY_READINGS: Final = 5
+"""Consecutive readings away from the stuck value that clear a stuck sensor."""
 
 MISSED_FIRINGS_MAX: Final = 72
 """Firings of the ring without a reading that make a sensor failing: three rounds of the longest pattern."""
@@ -100,7 +105,7 @@ def count_changes(c: SensorMemory, r: float, tolerance: float) -> None:
     if first or has_changed:
         steady = r if first else c.last_m
         c.counts.changes += 1
-        c.counts.leaps += has_changed and not abs(steady - c.steady_m) <= SAME_ECHO_M
+        c.counts.leaps += has_changed and not abs(steady - c.steady_m) <= LEAP_M
         c.steady_m = steady
 
 
@@ -182,7 +187,7 @@ def is_stuck(
     if approach >= APPROACH_MIN_M and c.run_length >= EQUAL_READINGS_MIN:
         changes, _ = neighbour_counts(i, neighbours, sensors, True)  # noqa: FBT003 - kernels take no keywords
         stuck = changes >= NEIGHBOUR_CHANGES_MIN
-    if not stuck and math.hypot(dx, dy) >= 2.0 * APPROACH_MIN_M and c.run_length >= 2 * EQUAL_READINGS_MIN:
+    if not stuck and math.hypot(dx, dy) >= PASSED_MIN_M and c.run_length >= PASSED_READINGS_MIN:
         changes, leaps = neighbour_counts(i, neighbours, sensors, False)  # noqa: FBT003 - kernels take no keywords
         stuck = leaps >= NEIGHBOUR_CHANGES_MIN or changes >= PASSED_CHANGES_MIN
     return bool(stuck and others_changed(i, sensors))
@@ -233,8 +238,8 @@ def count_too_near(c: SensorMemory, is_too_near: bool) -> None:
 
     An object so near that the sensor rings on looks the same, and must not be driven at either.
     """
-    c.too_near = min(RECOVERY_READINGS, c.too_near + 1) if is_too_near else max(0, c.too_near - 1)
-    if c.too_near == RECOVERY_READINGS:
+    c.too_near = min(TOO_NEAR_READINGS, c.too_near + 1) if is_too_near else max(0, c.too_near - 1)
+    if c.too_near == TOO_NEAR_READINGS:
         c.faults |= TOO_NEAR
     elif c.too_near == 0:
         c.faults &= ~TOO_NEAR

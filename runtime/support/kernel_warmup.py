@@ -95,8 +95,7 @@ def _ring(settings: Settings) -> None:
     from drivers.messages import Pose
     from perception.pipeline import Perception
     from perception.records import records, zeros
-    from perception.ring_faults.memory import LOOK_FIELDS
-    from perception.ring_faults.wiring import LOOKS, Wiring, weigh_turn
+    from perception.ring_faults.wiring import LOOK_FIELDS, LOOKS, Wiring, weigh_turn
     from perception.sensor_faults.memory import RingMemory, SensorMemory
     from perception.sensor_faults.silence import miss_share
     from perception.sensor_mounts import mounts_array, turn_mounts

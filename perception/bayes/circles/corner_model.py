@@ -17,15 +17,15 @@ from perception.bayes.inference.reservoir import copy_reading
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.parameters import (
     CORNER_EDGE_LEAD_GATES,
+    CORNER_FACE_READINGS_MIN,
     CORNER_HIT_NAT,
     CORNER_LEEWAY_COS,
     CORNER_MODEL_NAT,
     CORNER_OPENING_MIN,
     CORNER_OUT_OF_BEAM_GATES,
     CORNER_READINGS_MIN,
-    FIT_ROUNDS,
+    CORNER_ROUNDS,
     FIT_SOFTNESS,
-    READINGS_MIN,
 )
 from perception.bayes.memory.scratch import CornerFit, LineFit, Predictions
 from perception.bayes.memory.settings_record import TABLE_BINS, SettingsRecord
@@ -175,7 +175,7 @@ def fit_faces(
     cx, cy, radius = circle
     cos_may, gate = near
     has_edge = False
-    for turn in range(FIT_ROUNDS):
+    for turn in range(CORNER_ROUNDS):
         for side in range(2):
             k = 0
             ax = 0.0
@@ -197,12 +197,12 @@ def fit_faces(
             face = corner.faces[side]
             if turn == 0:
                 length = math.hypot(ax, ay)
-                if k < READINGS_MIN or length == 0.0:
+                if k < CORNER_FACE_READINGS_MIN or length == 0.0:
                     return False, False
                 face.normal_x = ax / length
                 face.normal_y = ay / length
                 face.distance = -radius
-            if k >= READINGS_MIN:
+            if k >= CORNER_FACE_READINGS_MIN:
                 fit_reading_line(
                     face_readings[:k],
                     (face.normal_x, face.normal_y, face.distance),
@@ -210,7 +210,7 @@ def fit_faces(
                     (cos_may - CORNER_LEEWAY_COS, gate),
                     FIT_SOFTNESS,
                     noise,
-                    FIT_ROUNDS,
+                    CORNER_ROUNDS,
                     fit,
                 )
                 face.normal_x = fit.normal_x

@@ -27,21 +27,21 @@ from perception.bayes.inference.reservoir import gather_history, keep_reading
 from perception.bayes.inference.track_labels import assign_number, clear_track, free_track, is_rejected
 from perception.bayes.memory.elements import ATTRACTING_MAX
 from perception.bayes.memory.parameters import (
+    ATTRACTING_MIN,
     CENTRE_VARIANCE_MAX_M2,
     CIRCLE_AROUND_M,
     CIRCLE_EVIDENCE_MIN_NAT,
     CIRCLE_READINGS_MIN,
     CIRCLE_RESTS_M,
     CIRCLE_RESTS_RAD,
-    ESTABLISH_HITS,
     FACING_RADII,
     FIRST_FIT_SOFTNESS,
     FIT_SOFTNESS,
     LINE_LENGTH_MIN_M,
-    MODEL_PRIOR_NAT,
+    NEW_LINE_HITS_MIN,
     OTHER_FIT_STEPS,
     OUTLINE_CELL_M,
-    READINGS_MIN,
+    RIVAL_OVER_UNKNOWN_NAT,
     SWITCH_LEAD_NAT,
 )
 from perception.bayes.memory.settings_record import SettingsRecord
@@ -90,7 +90,7 @@ def relax_onto_map(s: StateRecord, p: SettingsRecord, kind: int) -> None:
             attracting += 1
             if attracting == ATTRACTING_MAX:
                 break
-    if attracting >= READINGS_MIN:
+    if attracting >= ATTRACTING_MIN:
         relax_hypothesis(
             s, p[0].circles[kind].chords[:], attracting, CIRCLE_RESTS_M, CIRCLE_RESTS_RAD, OTHER_FIT_STEPS
         )
@@ -315,13 +315,13 @@ def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: in
     own = llr + (prior if kind < p[0].model_count else 0.0)
     if fit_other_line(s, p, n, (x, y, radius), bearing, OTHER_FIT_STEPS) > own + SWITCH_LEAD_NAT:
         line = scratch.line_score
-        if line.hits >= ESTABLISH_HITS and line.high - line.low > LINE_LENGTH_MIN_M:
+        if line.hits >= NEW_LINE_HITS_MIN and line.high - line.low > LINE_LENGTH_MIN_M:
             enter_line(s, scratch.line_fit, x, y, line)
         return UNSUPPORTED
     chosen, best, best_x, best_y = best_circle(s, p, kind, n, (x, y, radius), bearing, own)
     if chosen == kind and llr < p[0].unknown_nat * near:
         return UNSUPPORTED
-    if chosen != kind and best < p[0].unknown_nat * near + MODEL_PRIOR_NAT:
+    if chosen != kind and best < p[0].unknown_nat * near + RIVAL_OVER_UNKNOWN_NAT:
         return UNSUPPORTED
     if is_known(tracks, p, best_x, best_y, -1.0, nx, ny) or is_rejected(s, best_x, best_y, chosen, best):
         return SETTLED

@@ -17,17 +17,20 @@ from perception.bayes.inference.cross_path import is_crossed
 from perception.bayes.inference.likelihood import bounded_exp
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY
-from perception.bayes.memory.parameters import READINGS_MIN, SYSTEMATIC_M
+from perception.bayes.memory.parameters import EXPLAINED_ERROR_SIGMAS
 from perception.bayes.memory.scratch import BearingErrors
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CircleTrack, StateRecord
 from perception.kernel import kernel
-from perception.shared_numbers import OUTLIER_SIGMAS, ROUNDING
 
 OUTLINE_SIGMA_M: Final = 0.05
 """Deviation of an unknown outline from a model's: that of boxes of its size."""
 OUTLINE_SCALE_RAD: Final = 0.45
 """Bearing over which that deviation changes."""
+OUTLINE_SURFACE_M: Final = 0.005
+"""Deviation of a model's own surface, and of the poses from which it was heard."""
+OUTLINE_READINGS_MIN: Final = 3
+"""Least readings of a bearing that counts, so that their median ignores an outlier."""
 OUTLINE_BEARINGS_MIN: Final = 4
 """Least bearings: two of them are needed for the place, and a third has an outlier now and then."""
 OTHER_RADIUS_SIGMA_M: Final = 0.2
@@ -36,6 +39,10 @@ OTHER_RADIUS_SAME_M: Final = 0.015
 """With a smaller deviation a radius is the model's own."""
 OTHER_RADIUS_ERROR_M: Final = 0.04
 """Greatest standard deviation at which a radius is compared; before that the rivals suffice."""
+BIN_RAD: Final = math.tau / BEARING_BINS
+"""Bearing between two bins of a track's reservoir."""
+DETERMINANT_MIN: Final = 1e-9
+"""Least determinant of the centre's information, as a share of its diagonal: with less there is one bearing only."""
 
 
 @kernel
@@ -89,21 +96,21 @@ def average_errors(bearing: BearingErrors) -> None:
     """Write the mean of a bearing's errors (m) and its accuracy, the inverse of that mean's standard deviation (1/m).
 
     It needs the errors and the sum of their variances, of `sort_errors`. An error farther from the median than
-    `OUTLIER_SIGMAS` counts as that far. With fewer than `READINGS_MIN` errors the accuracy is 0 and
+    `EXPLAINED_ERROR_SIGMAS` counts as that far. With fewer than `OUTLINE_READINGS_MIN` errors the accuracy is 0 and
     the mean is not written.
     """
     n = bearing.count
     bearing.accuracy = 0.0
-    if n < READINGS_MIN:
+    if n < OUTLINE_READINGS_MIN:
         return
     variance = bearing.variance / n
     median = 0.5 * (bearing.errors[(n - 1) // 2] + bearing.errors[n // 2])
-    most = OUTLIER_SIGMAS * math.sqrt(variance)
+    most = EXPLAINED_ERROR_SIGMAS * math.sqrt(variance)
     total = 0.0
     for k in range(n):
         total += min(most, max(-most, bearing.errors[k] - median))
     bearing.mean = median + total / n
-    bearing.accuracy = 1.0 / math.sqrt(variance / n + SYSTEMATIC_M**2)
+    bearing.accuracy = 1.0 / math.sqrt(variance / n + OUTLINE_SURFACE_M**2)
 
 
 @kernel
@@ -141,7 +148,7 @@ def outline_lead(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
             root[b, k] = 0.0
             if there.accuracy == 0.0:
                 continue
-            alike = math.exp((math.cos((b - k) * math.tau / BEARING_BINS) - 1.0) / OUTLINE_SCALE_RAD**2)
+            alike = math.exp((math.cos((b - k) * BIN_RAD) - 1.0) / OUTLINE_SCALE_RAD**2)
             v = OUTLINE_SIGMA_M**2 * alike * here.accuracy * there.accuracy
             for i in range(k):
                 v -= root[b, i] * root[k, i]
@@ -180,7 +187,7 @@ def round_lead(s: StateRecord, p: SettingsRecord, n: int) -> float:
         if own.ahead[j] < p[0].cos_half_angle * own.distance[j]:
             continue
         variance = var0 + rel2 * q.range_m * q.range_m
-        most = OUTLIER_SIGMAS * math.sqrt(variance)
+        most = EXPLAINED_ERROR_SIGMAS * math.sqrt(variance)
         e = min(most, max(-most, e))
         ux, uy = own.slope_x[j], own.slope_y[j]
         is_slant = is_crossed(q) or own.rays > 0
@@ -195,7 +202,7 @@ def round_lead(s: StateRecord, p: SettingsRecord, n: int) -> float:
         ye += uy * e / variance
         re -= along * e / variance
     det = xx * yy - xy * xy
-    if det <= ROUNDING * xx * yy:
+    if det <= DETERMINANT_MIN * xx * yy:
         return 0.0
     # What the centre explains of the radius, and of the errors.
     ax = (yy * xr - xy * yr) / det

@@ -20,11 +20,12 @@ from typing import Final
 
 from perception.bayes.memory.elements import Reading
 from perception.kernel import kernel, loop_kernel
-from perception.shared_numbers import TINY
 
 LENGTH_MIN_M: Final = 1e-6
 """Lengths by which something is divided count as at least this, and a sensor as at least this far from a surface, so
 that none is inside a body."""
+LENGTH2_MIN: Final = 1e-200
+"""Least divisor: a place without a direction gives numbers, not an error."""
 
 
 @kernel
@@ -66,7 +67,7 @@ def over_circle(q: Reading, dx: float, dy: float, radius: float) -> tuple[float,
     between = radius if length2 == 0.0 else 0.0  # the circle lies between the sensors
     per_bend = half = gx = gy = 0.0
     for turn in range(2):
-        scale = 1.0 / math.sqrt(max(length2, TINY))
+        scale = 1.0 / math.sqrt(max(length2, LENGTH2_MIN))
         wx *= scale
         wy *= scale
         px, py = ax - radius * wx, ay - radius * wy
@@ -80,7 +81,7 @@ def over_circle(q: Reading, dx: float, dy: float, radius: float) -> tuple[float,
         if turn == 0:
             bend = (radius * (ax * wx + ay * wy) - slope_a * slope_a) * per_a
             bend += (radius * (bx * wx + by * wy) - slope_b * slope_b) * per_b
-            per_bend = 1.0 / max(bend, TINY) if bend > 0.0 else 0.0
+            per_bend = 1.0 / max(bend, LENGTH2_MIN) if bend > 0.0 else 0.0
             step = slope * per_bend
             wx, wy = wx + step * wy, wy - step * wx
             length2 = 1.0 + step * step

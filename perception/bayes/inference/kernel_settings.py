@@ -20,6 +20,7 @@ from perception.bayes.inference.likelihood import build_levels, build_table
 from perception.bayes.memory.parameters import (
     ASSOCIATING_LINE_M,
     BACKGROUND_RANGE_M,
+    COMPARE_ALL_BELOW,
     DIFFUSE_SILENCE,
     DISPERSION_MIN,
     FAR_M,
@@ -29,7 +30,6 @@ from perception.bayes.memory.parameters import (
     HISTORY_SPACING_M,
     HYPOTHESIS_SIGMA_MAX_M,
     IDLE_FIRINGS,
-    MANY_READINGS,
     MAY_ANSWER_DEG,
     MERGE_RADII,
     MIRRORS_HEARD,
@@ -217,7 +217,7 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: Bayes
     it.pair_range_max_m = PAIR_RANGE_MAX_M
     it.history_spacing_m = HISTORY_SPACING_M
     it.pair_gap_s = PAIR_GAP_S
-    it.compare_all_below = MANY_READINGS
+    it.compare_all_below = COMPARE_ALL_BELOW
     it.associating_line_m = ASSOCIATING_LINE_M
     it.hypothesis_sigma_m = HYPOTHESIS_SIGMA_MAX_M
     it.idle_firings = IDLE_FIRINGS

@@ -11,11 +11,12 @@ import math
 
 from perception.bayes.inference.cross_path import is_crossed, over_line
 from perception.bayes.inference.noise_estimation import noise_variance
+from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import MAX_LINES, Reading
 from perception.bayes.memory.parameters import (
     CIRCLE_WALL_BEHIND,
     CIRCLE_WALL_BEYOND_M,
-    GATE_M,
+    EXPLAINED_ERROR_SIGMAS,
     LINE_ANGLE_DRIFT_RAD2,
     LINE_ANGLE_VARIANCE_RAD2,
     LINE_DISTANCE_DRIFT_M2,
@@ -25,13 +26,15 @@ from perception.bayes.memory.parameters import (
     LINE_EDGE_GROW_M,
     LINE_EDGE_SLACK_M,
     LINE_FRONT_COS,
+    LINE_GROW_M,
     LINE_JOIN_M,
+    LINE_LOG_ODDS_MAX,
     LINE_SAME_M,
     LINE_SILENCE_WITHIN_M,
     LINE_SLACK_M,
     LINE_START_LOG_ODDS,
     PARALLEL_COS,
-    SURE_HITS,
+    WALL_ECHOES_MIN,
     WALL_FRONT_RADII,
     WALL_LENGTH_MIN_M,
 )
@@ -39,7 +42,6 @@ from perception.bayes.memory.scratch import ON_LINE, UNEXPLAINED, LineFit, LineS
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import Line, StateRecord
 from perception.kernel import kernel
-from perception.shared_numbers import FAR, OUTLIER_SIGMAS
 
 
 @kernel
@@ -77,7 +79,7 @@ def reaches(line: Line, along: float, beyond: float) -> bool:
 @kernel
 def is_sure_line(line: Line) -> bool:
     """Return whether a line is long enough and has enough echoes to be called a wall."""
-    return bool(line.echoes > SURE_HITS and line.high - line.low > WALL_LENGTH_MIN_M)
+    return bool(line.echoes > WALL_ECHOES_MIN and line.high - line.low > WALL_LENGTH_MIN_M)
 
 
 @kernel
@@ -239,16 +241,16 @@ def update_lines(s: StateRecord, p: SettingsRecord, m: int) -> None:
                 across = line.normal_x * q.listener_x + line.normal_y * q.listener_y
                 expected, _, _ = over_line(q, line.normal_x, line.normal_y, expected + 0.5 * across)
             var = var0 + rel2 * expected * expected
-            tight = half_box + LINE_SLACK_M + OUTLIER_SIGMAS * math.sqrt(max(var - half_box**2 / 3.0, 0.0))
+            tight = half_box + LINE_SLACK_M + EXPLAINED_ERROR_SIGMAS * math.sqrt(max(var - half_box**2 / 3.0, 0.0))
             associates = line.high - line.low > p[0].associating_line_m
             if dot >= p[0].cos_may_answer:
                 e = r - expected
-                if abs(e) < tight and reaches(line, foot, GATE_M):
+                if abs(e) < tight and reaches(line, foot, LINE_GROW_M):
                     if associates:
                         explain(s, i, k)
                     line.low = min(line.low, foot)
                     line.high = max(line.high, foot)
-                    line.log_odds = min(line.log_odds + LINE_ECHO_LOG_ODDS, 2.0 * LINE_START_LOG_ODDS)
+                    line.log_odds = min(line.log_odds + LINE_ECHO_LOG_ODDS, LINE_LOG_ODDS_MAX)
                     line.echoes += 1.0
                     correct_line(line, x - line.origin_x, y - line.origin_y, e, var)
                 elif goes_through(line, q, p, dot, foot, e):

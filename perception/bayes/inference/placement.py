@@ -6,21 +6,25 @@ import math
 from typing import Final
 
 from perception.bayes.inference.noise_estimation import noise_variance, tolerance_m
+from perception.bayes.inference.range_fit import FAR
 from perception.bayes.inference.reservoir import copy_reading
-from perception.bayes.memory.parameters import STILL_COS, STILL_M, SYSTEMATIC_M
+from perception.bayes.memory.parameters import STILL_COS, STILL_M
 from perception.bayes.memory.scratch import UNEXPLAINED
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import Sensor, StateRecord
 from perception.kernel import Floats, kernel
-from perception.shared_numbers import FAR
 
 COORDINATE_MAX_M: Final = 0.5 * FAR
 """A position farther than this from the odometry's origin is invalid: ranges this long mean silence."""
+STANDING_M: Final = 0.005
+"""A sensor that moved less is where it was; odometry trembles by less than this."""
 CHANGED_MIN: Final = 3
 """So many readings in turn that differ from the first one say that the surroundings have changed: of drop-outs of
 10 % one in a thousand series is so long. Each doubling of the looks before them asks for one more."""
 LOOKS_MAX: Final = 8
 """Readings from one place that can be evidence, of what is new there."""
+COUNTED: Final = LOOKS_MAX + 1
+"""Looks with which a sensor arrives at a place, so that its further ones there are no evidence."""
 
 
 @kernel
@@ -91,13 +95,13 @@ def place_readings(
         last = sensor.last
         moved = math.hypot(x - last.x, y - last.y)
         is_near = moved < STILL_M and ux * last.axis_x + uy * last.axis_y > STILL_COS
-        if is_near and moved < SYSTEMATIC_M:
+        if is_near and moved < STANDING_M:
             if not says_new(sensor, r, tolerance_m(2.0 * half_box, 2.0 * (var0 + rel2 * min(r, last.range_m) ** 2))):
                 continue
         elif is_near and abs(r - last.range_m) <= half_box:
             continue
         else:
-            sensor.looks = 1 if sensor.looks == 0 else (LOOKS_MAX + 1)
+            sensor.looks = 1 if sensor.looks == 0 else COUNTED
             sensor.changed = 0
         q = scratch.fired[m]
         q.x = x
@@ -106,7 +110,7 @@ def place_readings(
         q.axis_y = uy
         q.range_m = r
         q.listener_x = q.listener_y = 0.0
-        if sensor.looks == 1 or sensor.looks == (LOOKS_MAX + 1):  # Later ones from there may be strays.
+        if sensor.looks == 1 or sensor.looks == COUNTED:  # Later ones from there may be strays.
             copy_reading(q, last)
         if r <= least:  # after the above, or the next range from here would be the first look
             continue

@@ -29,7 +29,12 @@ from perception.bayes.memory.scratch import CircleFit, LineFit, LineScore, Predi
 from perception.bayes.memory.settings_record import Settings
 from perception.kernel import kernel
 from perception.records import Records
-from perception.shared_numbers import BEYOND_ALL, FAR
+
+FAR: Final = 1e6
+"""A range of this much or more (m) means no echo."""
+
+NONE_YET: Final = 1e9
+"""Initial least range and extent (m) of an object without a hit."""
 
 NO_INFORMATION: Final = 1e-12
 """Information (in single perfect readings) that a fit starts from, to be regular without echoes."""
@@ -99,7 +104,7 @@ def score_circle(
     near = 0.0
     axis_x = 0.0
     axis_y = 0.0
-    closest = BEYOND_ALL
+    closest = NONE_YET
     predict_circle(readings, cx, cy, radius, predicted)
     for j in range(len(readings)):
         q = readings[j]
@@ -338,8 +343,8 @@ def score_line(
     llr = 0.0
     hits = 0.0
     misses = 0.0
-    low = BEYOND_ALL
-    high = -BEYOND_ALL
+    low = NONE_YET
+    high = -NONE_YET
     if line.rays > 0:
         cos_may = cos_half = cos_must = GRAZING_MIN  # a ray meets a line at any angle
     for j in range(len(readings)):

@@ -23,8 +23,7 @@ MAY_ANSWER_DEG: Final = 0.4
 MUST_ANSWER_DEG: Final = 1.5
 """A reading must hit only this far inside the beam: sensitivity fades towards the edge."""
 GATE_M: Final = 0.5 * FOOT_M
-"""A range this near to the predicted one is attributed to the object; a line grows by echoes this far beyond its
-ends."""
+"""A range this near to the predicted one is attributed to the object."""
 MISSED_ECHO_PROBABILITY: Final = 0.1
 """Probability of a reading that should have hit and passed through."""
 SHORT_ECHO_NAT: Final = -1.0
@@ -56,8 +55,7 @@ START_NOISE_NAT: Final = 6.0
 ROUGHNESS_GATE_NAT: Final = 20.0
 """Noises less likely than the best by this, by roughness, are ruled out."""
 TRIPLE_MAX_M: Final = 1.0 * FOOT_M
-"""Greatest distance between the positions of a triple, or of neighbours that did not fire together: farther apart
-they rarely see one surface."""
+"""Greatest distance between the positions of a triple: farther apart they rarely see one surface."""
 CURVATURE_VARIANCE_M2: Final = 1e-4 * FOOT_M * FOOT_M
 """Variance that a curved surface adds to the middle of a triple."""
 ROUGHNESS_MEMORY: Final = 0.997
@@ -68,8 +66,8 @@ ELSEWHERE_PER_M: Final = 0.02 / FOOT_M
 """Density of a middle reading that hit something else."""
 RANGE_VARIANCE_MIN_M2: Final = 1e-6 * FOOT_M * FOOT_M
 """Least variance of a range, and of a fitted centre, so that perfect ones do not divide by zero."""
-SYSTEMATIC_M: Final = 0.005
-"""Error of poses and surfaces that the mean of many readings keeps; a sensor that moved by less is where it was."""
+EXPLAINED_ERROR_SIGMAS: Final = 3.0
+"""Greatest error of an explained range, in σ, beyond half its rounding; farther ones count as that far in a mean."""
 RESIDUAL_HITS_MIN: Final = 25.0
 """A certain object's residuals count from this many hits on."""
 RESIDUAL_EVERY: Final = 3
@@ -78,8 +76,7 @@ RESIDUAL_EVERY: Final = 3
 # --- Which readings are kept and attributed ------------------------------------------------------------------------
 
 HISTORY_SPACING_M: Final = 0.2 * FOOT_M
-"""Least distance between consecutive readings of a sensor's history, and least length of a mapped segment: a shorter
-one's direction is too uncertain for the relaxation."""
+"""Least distance between consecutive readings of a sensor's history."""
 STILL_M: Final = 0.05 * FOOT_M
 """A sensor that moved less than this, and turned less than `STILL_COS`, repeats an equal range."""
 STILL_COS: Final = 0.9998
@@ -107,6 +104,10 @@ BASELINE_MAX_M: Final = 2.6 * FOOT_M
 """Longest baseline that is tried."""
 NEIGHBOUR_BASELINE_MIN_M: Final = 0.3 * FOOT_M
 """Shortest baseline of neighbours that did not fire together."""
+NEIGHBOUR_BASELINE_MAX_M: Final = 1.0 * FOOT_M
+"""Longest baseline of neighbours that did not fire together."""
+MAPPED_LENGTH_MIN_M: Final = 0.2 * FOOT_M
+"""Least length of a mapped segment: a shorter one's direction is too uncertain for the relaxation."""
 HYPOTHESIS_SIGMA_MAX_M: Final = 0.7 * FOOT_M
 """Greatest standard deviation of the centre behind a segment that starts a hypothesis."""
 HYPOTHESES_PER_FIRING: Final = 2
@@ -120,8 +121,7 @@ request."""
 LINE_SAME_M: Final = 0.4 * FOOT_M
 """Greatest distance, across, of a parallel new line from a known one that is the same."""
 LINE_JOIN_M: Final = 1.0 * FOOT_M
-"""Greatest distance beyond the ends of a known line at which a parallel new one is the same, and at which a point on
-a wall's line is a corner of the room, not an edge of an object."""
+"""Greatest distance beyond the ends of a known line at which a parallel new one is the same."""
 LINE_ANGLE_VARIANCE_RAD2: Final = 0.02
 """Variance of a new line's direction, rad²: its standard deviation is 8°."""
 LINE_DISTANCE_VARIANCE_M2: Final = 0.01 * FOOT_M * FOOT_M
@@ -134,6 +134,8 @@ LINE_FRONT_COS: Final = 0.8
 """Least cosine between a sensor's axis and a line's normal at which it observes the line."""
 LINE_SLACK_M: Final = 0.02 * FOOT_M
 """Error of an explained range allowed beyond the noise."""
+LINE_GROW_M: Final = 0.5 * FOOT_M
+"""A line grows by echoes this far beyond its ends."""
 LINE_SILENCE_WITHIN_M: Final = 0.2 * FOOT_M
 """Silence counts this far inside its ends."""
 LINE_EDGE_SLACK_M: Final = 0.05 * FOOT_M
@@ -143,15 +145,21 @@ LINE_EDGE_GROW_M: Final = 0.7 * FOOT_M
 LINE_EDGE_COS: Final = 0.1
 """Such echoes count up to this cosine beyond the beam's edge."""
 LINE_START_LOG_ODDS: Final = 3.0
-"""Log odds of a new line; its greatest are twice as much."""
+"""Log odds of a new line."""
+LINE_LOG_ODDS_MAX: Final = 6.0
+"""Greatest log odds of a line."""
 LINE_ECHO_LOG_ODDS: Final = 0.5
 """What an echo adds to a line's log odds."""
 LINE_LENGTH_MIN_M: Final = 0.8 * FOOT_M
 """Least length of a line that is kept."""
+NEW_LINE_HITS_MIN: Final = 8.0
+"""Least hits of a new line that is kept."""
+REPLACING_LINE_HITS_MIN: Final = 6.0
+"""Least hits of a line that is kept when it replaces a circle."""
 ASSOCIATING_LINE_M: Final = 4.0 * FOOT_M
 """Least length of a line that takes readings from other explanations."""
-SURE_HITS: Final = 10.0
-"""A wall is a line that explained more echoes than this; least hits to establish the track of a polygon."""
+WALL_ECHOES_MIN: Final = 10.0
+"""A wall is a line that explained more echoes than this."""
 WALL_LENGTH_MIN_M: Final = 2.0 * FOOT_M
 """A wall is a line longer than this."""
 
@@ -169,15 +177,15 @@ CIRCLE_AROUND_M: Final = 0.4 * FOOT_M
 """Segments up to this far off the body may attract it."""
 FACING_RADII: Final = 0.6
 """A segment attracts where the body's centre lies at least this many radii behind it."""
-FIT_ROUNDS: Final = 3
-"""Rounds of a fit whose readings depend on the result of the round before, and of a placed or tentative track's."""
+ATTRACTING_MIN: Final = 3
+"""Fewer segments than this do not move a hypothesis."""
 OTHER_FIT_STEPS: Final = 4
 """Steps of the relaxation and of the fits of a circle that has no track yet, and of an explanation other than a
 track's own."""
 CIRCLE_RESTS_RAD: Final = 0.005
 """A circle's relaxation ends with turns below this and shifts below `CIRCLE_RESTS_M`."""
 CIRCLE_RESTS_M: Final = CIRCLE_RESTS_RAD * FOOT_M
-"""The shift that a turn by `CIRCLE_RESTS_RAD` makes a foot away; no search steps finer."""
+"""The shift that a turn by `CIRCLE_RESTS_RAD` makes a foot away."""
 FIT_SOFTNESS: Final = 9.0
 """Robustness of the fits: squared residual, in σ², at which the weight has fallen to a quarter."""
 FIRST_FIT_SOFTNESS: Final = 16.0
@@ -192,8 +200,6 @@ FIT_TURN_MAX_RAD: Final = 0.2
 """Longest turn of a line's fit."""
 FIT_TURN_MIN_RAD: Final = 1e-5
 """A turn below this ends a line's fit."""
-READINGS_MIN: Final = 3
-"""Fewer readings or segments than this decide nothing: two fix a line, the third tests it."""
 CIRCLE_READINGS_MIN: Final = 5
 """Least readings of a new track."""
 CIRCLE_EVIDENCE_MIN_NAT: Final = 10.0
@@ -201,6 +207,8 @@ CIRCLE_EVIDENCE_MIN_NAT: Final = 10.0
 SWITCH_LEAD_NAT: Final = 6.0
 """Lead required of another explanation: of a circle or a line over a circle, of an unknown object, at which a track
 ends, and of an established polygon over a circle in its place."""
+RIVAL_OVER_UNKNOWN_NAT: Final = 3.0
+"""Lead required of a rival over an unknown object."""
 CENTRE_VARIANCE_MAX_M2: Final = 0.2 * FOOT_M * FOOT_M
 """Greatest variance assumed for a fitted centre."""
 
@@ -209,7 +217,7 @@ CENTRE_VARIANCE_MAX_M2: Final = 0.2 * FOOT_M * FOOT_M
 UNKNOWN_NAT: Final = 2.0
 """Evidence of an unknown object for each near reading, against a circle."""
 MODEL_PRIOR_NAT: Final = 3.0
-"""Log prior of a known model over every other explanation, and of a rival over an unknown object."""
+"""Log prior of a known model over every other explanation."""
 LINE_PRIOR_NAT: Final = 1.0
 """Log prior ratio of walls to models."""
 DISPERSION_MIN: Final = 0.0015
@@ -220,8 +228,12 @@ FAR_M: Final = 6.0 * FOOT_M
 """The prior of an object as a model falls with the distance beyond this, if it was heard only from there."""
 FAR_NAT_PER_M: Final = 2.0 / FOOT_M
 """How fast that prior falls."""
+TRACK_READINGS_MIN: Final = 3
+"""A track with fewer readings ends."""
 TRACK_FIT_STEPS: Final = 2
 """Steps of the fit that precedes the posterior of an established track."""
+TENTATIVE_FIT_STEPS: Final = 3
+"""Steps of the fit that precedes the posterior of a tentative track."""
 FIT_LEAD_SIGMAS2: Final = 6.0
 """A robust fit this many σ² off replaces the pose."""
 FITTED_REFINEMENTS: Final = 2
@@ -247,8 +259,7 @@ IN_WALL_NAT: Final = -8.0
 ESTABLISH_PROBABILITY: Final = 0.7
 """Least probability of a track that is established."""
 ESTABLISH_HITS: Final = 8.0
-"""Least hits of a track that is established, and of a new line that is kept. As many readings are added to an
-object's count, so that one with few is not refined at every reading."""
+"""Least hits of a track that is established."""
 ESTABLISH_ROOT_M: Final = 0.25 * FOOT_M
 """Greatest standard deviation of a track that is established."""
 DOUBT_PROBABILITY: Final = 0.2
@@ -265,7 +276,11 @@ ELSEWHERE_LEAD_NAT: Final = 1.0
 # --- The corner as an explanation ----------------------------------------------------------------------------------
 
 CORNER_READINGS_MIN: Final = 8
-"""Least number of readings of two faces together, and of a polygon that is tried."""
+"""Least number of readings of two faces together."""
+CORNER_FACE_READINGS_MIN: Final = 3
+"""Least number of readings of one face: two to fix it and one to test it."""
+CORNER_ROUNDS: Final = 3
+"""Rounds of assigning readings to the faces and fitting both, and steps of each fit."""
 CORNER_LEEWAY_COS: Final = 0.02
 """Cosine by which a face's fit extends the beam, so that a face started at a wrong angle keeps its readings."""
 CORNER_OUT_OF_BEAM_GATES: Final = 2.0
@@ -312,12 +327,16 @@ NO_WALL_LEAD_NAT: Final = -4.0
 """Lead of a wall at which it is excluded. Walls are the most frequent alternative."""
 NAMED_DISPERSION_MIN: Final = 0.008
 """Least dispersion of the axes of an object seen from two sides; an object straight ahead has less."""
+NAME_KEPT_PROBABILITY: Final = 0.5
+"""Least probability at which a name is kept: likelier than everything else together."""
 NAMED_SIGMA_MAX_M: Final = 0.17 * FOOT_M
 """Greatest standard deviation of a named circle along either axis."""
 PLACED_SIGMA_M: Final = 0.15
 """Standard deviation of a position that a user gave: it is wrong by a decimetre or two."""
 CIRCLE_INFLATION: Final = 1.1
 """Factor on a circle's covariance when it is reported."""
+ROOM_CORNER_M: Final = 1.0 * FOOT_M
+"""A point this near to a wall's line is a corner of the room, not an edge of an object."""
 POST_RADIUS_M: Final = 1.0 * FOOT_M
 """A round rival thinner than this is a post, a thicker one a barrel."""
 UNKNOWN_HITS_MIN: Final = 5.0
@@ -327,9 +346,8 @@ UNKNOWN_HITS_MIN: Final = 5.0
 
 ROOM_MARGIN_M: Final = 0.2
 """Mapped walls explain as far as this beyond the ends of their spans, and a thin object there is the wall's edge."""
-SOME_REFINEMENTS: Final = 4
-"""In one of so many of its refinements a named object is checked, and a polygon searched whose covariance is known
-and that explains its readings. The search is wide in so many first ones, and then in one of twice as many."""
+MODEL_CHECK_EVERY: Final = 4
+"""A named object is checked in every fourth of its refinements."""
 READINGS_MEMORY: Final = 0.999
 """Factor on counts and sums after each reading: a memory of a thousand, a few seconds of driving."""
 MIRRORS_HEARD: Final = 8
@@ -346,6 +364,8 @@ TRUSTED_M: Final = 15.0
 
 REJECTED_MAX_NAT: Final = 40.0
 """New evidence that always lifts a rejection: about ten good echoes, four times what starts a track."""
+PLACED_ROUNDS: Final = 3
+"""Relaxations of a placed model onto the map, a few steps each."""
 PLACED_STRAY_MAX_M: Final = 0.5
 """Greatest shift of a placed model by a relaxation: one that moves farther has found something else."""
 PLACED_STRAY_MAX_RAD: Final = 0.8
@@ -353,9 +373,8 @@ PLACED_STRAY_MAX_RAD: Final = 0.8
 
 # --- Which track is refined next -----------------------------------------------------------------------------------
 
-MANY_READINGS: Final = 80
-"""With fewer readings than this each refinement of a circle compares all alternatives, and a reported polygon needs
-`MANY_HITS`."""
+COMPARE_ALL_BELOW: Final = 80
+"""With fewer readings than this each refinement compares all alternatives."""
 IDLE_FIRINGS: Final = 12
 """Firings without new evidence after which a track gets its final refinements."""
 FINAL_REFINEMENTS: Final = 6
@@ -364,6 +383,10 @@ UNSURE_FACTOR: Final = 4.0
 """Factor on the evidence of an object that is not certain, so that it is refined earlier."""
 UNSURE_ROOT_M: Final = 0.03 * FOOT_M
 """An object is not certain if its position is less certain than this, and perhaps wrong."""
+CERTAIN_PROBABILITY: Final = 0.95
+"""An object less probable than this is not certain."""
+RESERVOIR_OFFSET: Final = 8.0
+"""Readings added to an object's count, so that an object with few is not refined at every reading."""
 FINAL_VALUE: Final = 1e-6
 """Value of a final refinement above the threshold."""
 PASSED_OVER_MAX: Final = 60

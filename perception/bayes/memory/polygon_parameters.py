@@ -6,9 +6,11 @@ the name or in the line below; a plain number is a count, a factor or a share.
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from config.units import FOOT_M
+from perception.bayes.memory.parameters import MAY_ANSWER_DEG
 
 # --- What a polygon answers ----------------------------------------------------------------------------------------
 
@@ -34,6 +36,14 @@ SEARCH_SHRINK: Final = 0.5
 """Factor on the steps when no move gains."""
 SEARCH_GAIN_MIN_NAT: Final = 1e-6
 """Smallest score gain that counts as progress."""
+SEARCH_FINEST_M: Final = 0.005 * FOOT_M
+"""Step below which a search ends: a tenth of the resolution, narrower than the likelihood's plateau."""
+SEARCH_EVERY: Final = 4
+"""A pose whose covariance is known and that explains its readings is searched only once in this many refinements."""
+WIDE_SEARCHES_FIRST: Final = 4
+"""The search is wide in so many first refinements."""
+WIDE_SEARCH_EVERY: Final = 8
+"""After these the search is wide in one of so many refinements."""
 FITTING_SHARE: Final = 0.85
 """The search is wide every other time while less than this share of the near readings is explained."""
 COARSE_READINGS: Final = 96
@@ -61,12 +71,16 @@ REQUEST_SAME_M: Final = 0.25 * FOOT_M
 """A segment this near to a parallel one makes the same request."""
 POLYGON_AROUND_M: Final = 0.3 * FOOT_M
 """Segments up to this far off the farthest vertex may attract the body; circles up to there stand in its place."""
+POLYGON_RELAXATION_STEPS: Final = 3
+"""Greatest number of a polygon's relaxation steps."""
 POLYGON_RESTS_RAD: Final = 0.01
 """These steps end with turns below this and shifts below `POLYGON_RESTS_M`."""
 POLYGON_RESTS_M: Final = POLYGON_RESTS_RAD * FOOT_M
 """The shift that a turn by `POLYGON_RESTS_RAD` makes a foot away."""
 SIDE_SHIFTS: Final = (-0.3, 0.0, 0.3)
 """Where on a side the segment is laid, from its middle, in lengths of the side."""
+TRIAL_READINGS_MIN: Final = 8
+"""Least readings of a trial."""
 TRIAL_READINGS_MAX: Final = 80
 """Greatest number of readings that a trial scores: it is only compared with the other trials."""
 TRIAL_STEP_M: Final = 0.2 * FOOT_M
@@ -125,6 +139,8 @@ POLYGON_EVIDENCE_MIN_NAT: Final = 5.0
 """A track with less evidence than this ends."""
 POLYGON_UNKNOWN_LEAD_NAT: Final = 8.0
 """A track ends if the evidence of an unknown object leads it by this."""
+POLYGON_ESTABLISH_HITS: Final = 10.0
+"""Least hits to establish a track."""
 POLYGON_ESTABLISH_SURE: Final = 3.0
 """Least sure hits to establish a track: corners alone fit anywhere."""
 MANY_HITS: Final = 20.0
@@ -155,6 +171,9 @@ POLYGON_WALL_BEYOND_M: Final = 2.0 * FOOT_M
 
 # --- Which polygons are reported, and how --------------------------------------------------------------------------
 
+POLYGON_PROBABILITY: Final = 0.9
+"""A polygon is established from this probability on, and reported, or from the user's `report_probability` if that is
+less."""
 POLYGON_NEAR_M: Final = 6.5 * FOOT_M
 """Greatest distance of the nearest sensor that heard a reported body."""
 POLYGON_DISPERSION_MIN: Final = 0.02
@@ -163,8 +182,12 @@ POLYGON_SIGMA_MAX_M: Final = 0.2 * FOOT_M
 """Greatest standard deviation of its position along either axis."""
 POLYGON_NAMED_HITS_SWEPT: Final = 12.0
 """Least hits of a reported body that many readings fit, in place of `MANY_HITS`."""
+POLYGON_SWEPT_READINGS: Final = 80
+"""Least readings, silences included, that bear on such a body and fit it."""
 POLYGON_INFLATION: Final = 1.15
 """Factor on a polygon's reported covariance: the noise does not include the influence of its neighbours."""
+POLYGON_TURN_SIGMA_RAD: Final = math.radians(MAY_ANSWER_DEG)
+"""Least standard deviation of its heading: that of the beam's edges, since an echo at an edge turns a body."""
 
 # --- Effort --------------------------------------------------------------------------------------------------------
 

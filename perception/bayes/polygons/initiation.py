@@ -19,7 +19,7 @@ from perception.bayes.inference.reservoir import copy_reading, keep_reading
 from perception.bayes.inference.track_labels import assign_number, clear_track, free_track, is_rejected
 from perception.bayes.memory.elements import ATTRACTING_MAX, MAX_POLYGONS, REQUESTS_MAX, Reading
 from perception.bayes.memory.job_records import INITIATION
-from perception.bayes.memory.parameters import CORNER_READINGS_MIN, FIT_ROUNDS, OUTLINE_CELL_M, PARALLEL_COS
+from perception.bayes.memory.parameters import OUTLINE_CELL_M, PARALLEL_COS
 from perception.bayes.memory.polygon_parameters import (
     APART_WHOLE,
     CHALLENGE_UNSEEN,
@@ -28,6 +28,7 @@ from perception.bayes.memory.polygon_parameters import (
     FINE_STEP_M,
     POLYGON_AROUND_M,
     POLYGON_HITS_MIN,
+    POLYGON_RELAXATION_STEPS,
     POLYGON_RESTS_M,
     POLYGON_RESTS_RAD,
     POLYGONS_APART,
@@ -35,6 +36,7 @@ from perception.bayes.memory.polygon_parameters import (
     SIDE_SHIFTS,
     TRIAL_EVIDENCE_MIN_NAT,
     TRIAL_READINGS_MAX,
+    TRIAL_READINGS_MIN,
     TRIAL_ROUNDS,
     TRIAL_STEP_M,
     WHOLE_SHARE,
@@ -121,7 +123,7 @@ def relax_polygon(s: StateRecord, p: SettingsRecord, model: int) -> None:
         attracting,
         POLYGON_RESTS_M,
         POLYGON_RESTS_RAD,
-        FIT_ROUNDS,
+        POLYGON_RELAXATION_STEPS,
     )
 
 
@@ -324,7 +326,7 @@ def lay_next(s: StateRecord, p: SettingsRecord) -> int:
         relax_polygon(s, p, model)
     hypothesis = s[0].scratch.hypothesis
     job.reading_count = gather_job_readings(s, p, model, hypothesis.x, hypothesis.y)
-    if job.reading_count >= CORNER_READINGS_MIN:
+    if job.reading_count >= TRIAL_READINGS_MIN:
         start_search(
             s, hypothesis.x, hypothesis.y, hypothesis.heading, TRIAL_STEP_M, TRIAL_ROUNDS, TRIAL_READINGS_MAX
         )

@@ -15,9 +15,10 @@ from perception.bayes.inference.cross_path import is_crossed
 from perception.bayes.inference.likelihood import level_of, log_likelihood
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.job_records import ACROSS, ALONG, AXES, TURN, PoseSearch
-from perception.bayes.memory.parameters import CIRCLE_RESTS_M, DROP_OUT_NAT, DROP_OUT_SHARE
+from perception.bayes.memory.parameters import DROP_OUT_NAT, DROP_OUT_SHARE
 from perception.bayes.memory.polygon_parameters import (
     GRAZING_COS,
+    SEARCH_FINEST_M,
     SEARCH_GAIN_MIN_NAT,
     SEARCH_SHRINK,
     SEARCH_TURN_RAD_PER_M,
@@ -387,7 +388,7 @@ def continue_search(
             search.rounds_left -= 1
             if search.has_gained == 0:
                 search.step_m *= SEARCH_SHRINK
-                if search.step_m < CIRCLE_RESTS_M:
+                if search.step_m < SEARCH_FINEST_M:
                     search.rounds_left = 0
             search.has_gained = 0
     return scored

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 from perception.bayes.memory.job_records import ACROSS, ALONG, JUDGE, SEARCH_NEAR, SEARCH_WIDE
-from perception.bayes.memory.parameters import SOME_REFINEMENTS
 from perception.bayes.memory.polygon_parameters import (
     COARSE_READINGS,
     FINE_STEP_M,
@@ -20,7 +19,10 @@ from perception.bayes.memory.polygon_parameters import (
     RESTART_ROUNDS,
     RESTART_SHIFTS,
     RESTART_TURNS,
+    SEARCH_EVERY,
     WIDE_ROUNDS,
+    WIDE_SEARCH_EVERY,
+    WIDE_SEARCHES_FIRST,
     WIDE_STEP_M,
 )
 from perception.bayes.memory.settings_record import PolygonSide, SettingsRecord
@@ -43,14 +45,14 @@ def begin_pose_search(s: StateRecord, t: int) -> None:
     job.best.y = track.y
     job.best.heading = track.heading
     if (
-        count < SOME_REFINEMENTS
-        or count % (2 * SOME_REFINEMENTS) == 0
+        count < WIDE_SEARCHES_FIRST
+        or count % WIDE_SEARCH_EVERY == 0
         or track.has_challenger > 0
         or (not is_fitting and count % 2 == 0)
     ):
         start_search(s, track.x, track.y, track.heading, WIDE_STEP_M, WIDE_ROUNDS, COARSE_READINGS)
         job.stage = SEARCH_WIDE
-    elif track.covariance.xx > 0.0 and is_fitting and count % SOME_REFINEMENTS != 0:
+    elif track.covariance.xx > 0.0 and is_fitting and count % SEARCH_EVERY != 0:
         job.stage = JUDGE  # the lattice moves to the pose without a search
     else:
         search_near(s)

@@ -42,6 +42,9 @@ CUT: Final = float((_NORMAL * LATTICE[:, 0] ** 2).sum() / _NORMAL.sum())
 """Variance of a normal distribution of the expected width, summed on the lattice, in squared pitches."""
 CUT_OFF: Final = LATTICE_PITCH**2 * CUT
 """The same in squared standard deviations: one, but for the tails that are cut off."""
+NARROW: Final = LATTICE_NARROW * CUT
+WIDE: Final = LATTICE_WIDE * CUT
+"""The lattice is laid again when a variance lies outside these, in squared pitches."""
 THINNEST: Final = LATTICE_THINNEST * CUT
 """Least variance, in squared pitches, that the next lattice assumes: a narrower peak falls between the points."""
 
@@ -284,7 +287,7 @@ def advance_lattice(s: StateRecord, p: SettingsRecord, model: int, left: int) ->
         narrowest = min(moments.aa, moments.bb, moments.cc)
         widest = max(moments.aa, moments.bb, moments.cc)
         job.lattices += 1
-        if off < LATTICE_OFF_CENTRE and narrowest > LATTICE_NARROW * CUT and widest < LATTICE_WIDE * CUT:
+        if off < LATTICE_OFF_CENTRE and narrowest > NARROW and widest < WIDE:
             job.lattices = LATTICE_ATTEMPTS
         if job.lattices < LATTICE_ATTEMPTS:
             lay_lattice(s, p, model)

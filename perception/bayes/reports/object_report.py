@@ -13,20 +13,18 @@ from perception.bayes.memory.elements import round_label
 from perception.bayes.memory.parameters import (
     CIRCLE_INFLATION,
     GATE_M,
-    LINE_JOIN_M,
-    MAY_ANSWER_DEG,
     PLACED_SIGMA_M,
+    ROOM_CORNER_M,
     ROOM_MARGIN_M,
-    SURE_HITS,
     UNKNOWN_HITS_MIN,
+    WALL_ECHOES_MIN,
     WALL_LENGTH_MIN_M,
 )
-from perception.bayes.memory.polygon_parameters import EDGE_REACH_M, POLYGON_INFLATION
+from perception.bayes.memory.polygon_parameters import EDGE_REACH_M, POLYGON_INFLATION, POLYGON_TURN_SIGMA_RAD
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, Memory, PolygonTrack
 from perception.bayes.reports.claimed_echoes import own_echoes
 from perception.bayes.tracks.track_archive import TrackArchive
-from perception.bayes.walls.contact import PLACE_SLACK_M
 from perception.bayes.walls.crossing import CORNER_SINE_MIN
 from perception.bayes.walls.points import SPREAD_MIN_RAD
 from perception.bayes.walls.report import has_mirrors, room_report
@@ -47,6 +45,9 @@ CIRCLE_FIELDS: Final = (
 READINGS: Final = "readings"
 """Field of an archived circle."""
 NO_SURFACES: Final = np.empty((0, 4))
+WALL_OFF_M: Final = 0.05
+"""A post at the end of a sure wall, within `ROOM_MARGIN_M`, and this near to touching its line is the edge in which
+the wall ends: their ranges differ by less than the noise, and every wall ends somewhere."""
 Row = tuple[float, ...]
 
 
@@ -90,7 +91,7 @@ def polygon_covariance(track: PolygonTrack) -> Floats:
     covariance[np.tril_indices(3)] = POLYGON_INFLATION * np.array(
         [held.xx, held.yx, held.yy, held.hx, held.hy, held.hh]
     )
-    covariance[2, 2] += math.radians(MAY_ANSWER_DEG) ** 2
+    covariance[2, 2] += POLYGON_TURN_SIGMA_RAD**2
     return covariance + np.tril(covariance, -1).T
 
 
@@ -150,7 +151,7 @@ def archived_models(
 def known_walls(memory: Memory) -> Structured:
     """Return the lines that recognition takes for walls, as records of `state.Line`."""
     lines = memory.state["lines"][0]
-    is_wall = (lines["echoes"] > SURE_HITS) & (lines["high"] - lines["low"] > WALL_LENGTH_MIN_M)
+    is_wall = (lines["echoes"] > WALL_ECHOES_MIN) & (lines["high"] - lines["low"] > WALL_LENGTH_MIN_M)
     return lines[is_wall]
 
 
@@ -194,8 +195,8 @@ def rival_label(memory: Memory, x: float, y: float, radius: float) -> str:
         nx, ny = line["normal_x"], line["normal_y"]
         dx, dy = x - line["origin_x"], y - line["origin_y"]
         along = -ny * dx + nx * dy
-        is_within = line["low"] - LINE_JOIN_M < along < line["high"] + LINE_JOIN_M
-        if is_within and abs(nx * dx + ny * dy - line["distance"]) < LINE_JOIN_M:
+        is_within = line["low"] - ROOM_CORNER_M < along < line["high"] + ROOM_CORNER_M
+        if is_within and abs(nx * dx + ny * dy - line["distance"]) < ROOM_CORNER_M:
             sides.append((nx, ny, 1.0 if abs(line["low"] - along) < abs(line["high"] - along) else -1.0))
     for (ax, ay, way), (bx, by, other_way) in itertools.combinations(sides, 2):
         if way != other_way and way * (ax * by - ay * bx) < -CORNER_SINE_MIN:
@@ -219,7 +220,7 @@ def wall_edge(surfaces: Floats, x: float, y: float, radius: float) -> tuple[floa
     dx, dy = x - walls[:, 0], y - walls[:, 1]
     along, across = tx * dx + ty * dy, tx * dy - ty * dx
     beyond = np.abs(np.maximum(-along, along - length))
-    beyond[np.abs(across) > radius + PLACE_SLACK_M] = math.inf
+    beyond[np.abs(across) > radius + WALL_OFF_M] = math.inf
     if not (beyond < ROOM_MARGIN_M).any():
         return None
     k = int(beyond.argmin())

@@ -8,14 +8,15 @@ from __future__ import annotations
 import math
 
 from perception.bayes.inference.noise_estimation import noise_variance
+from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import HISTORY, Reading
 from perception.bayes.memory.parameters import (
     BASELINE_MAX_M,
     BASELINE_MIN_M,
     BASELINES,
-    HISTORY_SPACING_M,
+    MAPPED_LENGTH_MIN_M,
+    NEIGHBOUR_BASELINE_MAX_M,
     NEIGHBOUR_BASELINE_MIN_M,
-    TRIPLE_MAX_M,
 )
 from perception.bayes.memory.scratch import PairSegment
 from perception.bayes.memory.settings_record import SettingsRecord
@@ -23,7 +24,6 @@ from perception.bayes.memory.state import StateRecord
 from perception.bayes.segments.segment_list import put_segment
 from perception.bayes.segments.segment_pairs import tangent
 from perception.kernel import kernel
-from perception.shared_numbers import FAR
 
 
 @kernel
@@ -114,7 +114,10 @@ def pair_in_ring(s: StateRecord, p: SettingsRecord, i: int, m: int, time_s: floa
             at = (other.kept - 1) % HISTORY
             old = other.history[at]
             base = math.hypot(q.x - old.x, q.y - old.y)
-            if time_s - other.times_s[at] < p[0].pair_gap_s and NEIGHBOUR_BASELINE_MIN_M < base < TRIPLE_MAX_M:
+            if (
+                time_s - other.times_s[at] < p[0].pair_gap_s
+                and NEIGHBOUR_BASELINE_MIN_M < base < NEIGHBOUR_BASELINE_MAX_M
+            ):
                 made = add_pair(s, p, i, old, var, made)
     return made
 
@@ -159,7 +162,7 @@ def make_segments(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> i
             made = pair_in_time(s, p, i, time_s, var, made)
             made = pair_in_ring(s, p, i, m, time_s, var, made)
     for k in range(made):
-        if scratch.segments[k].length > HISTORY_SPACING_M:
+        if scratch.segments[k].length > MAPPED_LENGTH_MIN_M:
             map_segment(s, scratch.segments[k], time_s)
     s[0].segments_made += made
     return made

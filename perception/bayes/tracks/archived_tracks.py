@@ -15,16 +15,16 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.bayes.memory.parameters import READINGS_MIN
+from perception.bayes.circles.outline_check import OUTLINE_READINGS_MIN
+from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.state import FREE, TENTATIVE, CircleTrack, PolygonTrack
 from perception.bounds import COUNT, FLAG, PLACE, Fields, up_to
 from perception.kernel import Floats
 from perception.map_moves import MapMoves
 from perception.records import Structured
-from perception.shared_numbers import FAR
 
 ARCHIVED_READINGS: Final = 48
-"""Readings of an archived track: `READINGS_MIN` of 16 bearings, or more of fewer."""
+"""Readings of an archived track: `OUTLINE_READINGS_MIN` of 16 bearings, or more of fewer."""
 BINS: Final = "bins"
 """The field of a track that holds its readings, which an archived one keeps in another form."""
 
@@ -154,9 +154,9 @@ def newest_readings(bins: Structured) -> Structured:
     order = np.argsort(which, kind="stable")
     ranks = np.zeros(len(found), np.int64)
     ranks[order] = np.arange(len(found)) - np.searchsorted(which[order], which[order])
-    is_new = ranks < READINGS_MIN
+    is_new = ranks < OUTLINE_READINGS_MIN
     heard = np.bincount(which[is_new & (found["range_m"] < FAR)], minlength=len(bins))
-    many, most = np.flatnonzero(heard == READINGS_MIN), ARCHIVED_READINGS // READINGS_MIN
+    many, most = np.flatnonzero(heard == OUTLINE_READINGS_MIN), ARCHIVED_READINGS // OUTLINE_READINGS_MIN
     if len(many) > most:
         many = many[np.arange(most) * len(many) // most]
     is_silence = (ranks == 0) & (found["range_m"] >= FAR)

@@ -22,7 +22,7 @@ from perception.bayes.inference.track_labels import assign_number, free_track
 from perception.bayes.memory.job_records import REFINEMENT
 from perception.bayes.memory.parameters import (
     CENTRE_VARIANCE_MAX_M2,
-    FIT_ROUNDS,
+    PLACED_ROUNDS,
     PLACED_STRAY_MAX_M,
     PLACED_STRAY_MAX_RAD,
 )
@@ -49,7 +49,7 @@ def settle_circle(s: StateRecord, p: SettingsRecord, kind: int, x: float, y: flo
     """
     hypothesis = s[0].scratch.hypothesis
     set_hypothesis(s, x, y, 0.0)
-    for _ in range(FIT_ROUNDS):
+    for _ in range(PLACED_ROUNDS):
         relax_onto_map(s, p, kind)
     if math.hypot(hypothesis.x - x, hypothesis.y - y) > PLACED_STRAY_MAX_M:
         hypothesis.x = x
@@ -134,7 +134,7 @@ def settle_polygon(s: StateRecord, p: SettingsRecord, model: int, x: float, y: f
     """
     hypothesis = s[0].scratch.hypothesis
     set_hypothesis(s, x, y, heading)
-    for _ in range(FIT_ROUNDS):
+    for _ in range(PLACED_ROUNDS):
         relax_polygon(s, p, model)
     if (
         math.hypot(hypothesis.x - x, hypothesis.y - y) > PLACED_STRAY_MAX_M

@@ -10,11 +10,12 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
+from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import MAX_POLYGONS, POLYGON_BIN_CAPACITY
 from perception.bayes.memory.parameters import (
     ALONE_LEAD_NAT,
     IN_WALL_NAT,
-    MANY_READINGS,
+    NAME_KEPT_PROBABILITY,
     NAMED_DISPERSION_MIN,
     NAMED_OVER_UNKNOWN,
     NAMED_OVER_UNKNOWN_ALONE,
@@ -27,12 +28,12 @@ from perception.bayes.memory.polygon_parameters import (
     POLYGON_NAMED_HITS_SWEPT,
     POLYGON_NEAR_M,
     POLYGON_SIGMA_MAX_M,
+    POLYGON_SWEPT_READINGS,
 )
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import ESTABLISHED, FREE, CircleTrack, CircleTracks, PolygonTrack, StateRecord
 from perception.kernel import Ints, kernel
 from perception.records import Record, Records
-from perception.shared_numbers import EVEN, FAR
 
 OVERLAP_MAX_M: Final = 0.1 * FOOT_M
 """Two named circles overlap by no more than this, which their positions may be wrong by."""
@@ -116,8 +117,8 @@ def update_name(
     if (
         track.status != ESTABLISHED
         or track.kind >= p[0].model_count
-        or track.probability < min(least, EVEN)
-        or is_name_doubtful(track, p, EVEN if track.is_named == 1 else sure, careful)
+        or track.probability < min(least, NAME_KEPT_PROBABILITY)
+        or is_name_doubtful(track, p, NAME_KEPT_PROBABILITY if track.is_named == 1 else sure, careful)
     ):
         track.is_named = 0
         return
@@ -238,7 +239,7 @@ def is_sure_polygon(track: PolygonTrack, least: float) -> bool:
                 x += q.axis_x
                 y += q.axis_y
                 heard += 1
-    if track.hits < (POLYGON_NAMED_HITS_SWEPT if swept >= MANY_READINGS else MANY_HITS):
+    if track.hits < (POLYGON_NAMED_HITS_SWEPT if swept >= POLYGON_SWEPT_READINGS else MANY_HITS):
         return False
     return heard > 0 and nearest <= POLYGON_NEAR_M and 1.0 - math.hypot(x, y) / heard > POLYGON_DISPERSION_MIN
 

@@ -22,7 +22,7 @@ from perception.bayes.memory.job_records import (
     SEARCH_NEAR,
     SEARCH_WIDE,
 )
-from perception.bayes.memory.parameters import ELSEWHERE_LEAD_NAT, PLACED_STRAY_MAX_M, SURE_HITS
+from perception.bayes.memory.parameters import ELSEWHERE_LEAD_NAT, PLACED_STRAY_MAX_M
 from perception.bayes.memory.polygon_parameters import (
     FITTING_SHARE,
     LATTICE_ATTEMPTS,
@@ -31,8 +31,10 @@ from perception.bayes.memory.polygon_parameters import (
     OVERLAP_RADII,
     POLYGON_DOUBT_PROBABILITY,
     POLYGON_DOUBT_SHARE,
+    POLYGON_ESTABLISH_HITS,
     POLYGON_ESTABLISH_SURE,
     POLYGON_EVIDENCE_MIN_NAT,
+    POLYGON_PROBABILITY,
     POLYGON_UNKNOWN_LEAD_NAT,
     QUANTUM_COST,
     TWIN_RADII,
@@ -68,7 +70,6 @@ from perception.bayes.tracks.model_check import is_on_long_walls
 from perception.bayes.tracks.naming import is_sure_polygon
 from perception.bayes.tracks.track_selection import choose_polygon
 from perception.kernel import kernel
-from perception.shared_numbers import LIKELY
 
 
 @kernel
@@ -86,8 +87,8 @@ def update_polygon_status(s: StateRecord, p: SettingsRecord, track: PolygonTrack
     elif track.status == TENTATIVE:
         is_fitting = track.hits > FITTING_SHARE * track.near
         sure = POLYGON_ESTABLISH_SURE if track.hits < MANY_HITS else MANY_HITS_SURE
-        is_heard = track.hits >= SURE_HITS and track.sure_hits >= sure
-        if track.probability > LIKELY and is_fitting and is_heard:
+        is_heard = track.hits >= POLYGON_ESTABLISH_HITS and track.sure_hits >= sure
+        if track.probability > POLYGON_PROBABILITY and is_fitting and is_heard:
             s[0].job.stage = LATTICE
             if track.covariance.xx > 0.0:
                 track.status = ESTABLISHED
@@ -157,7 +158,7 @@ def begin_refinement(s: StateRecord, p: SettingsRecord, threshold: float) -> boo
 @kernel
 def is_sure(track: PolygonTrack, p: SettingsRecord) -> bool:
     """Return whether a polygon's readings make it sure enough to be reported."""
-    return is_sure_polygon(track, min(p[0].report_probability, LIKELY))
+    return is_sure_polygon(track, min(p[0].report_probability, POLYGON_PROBABILITY))
 
 
 @kernel

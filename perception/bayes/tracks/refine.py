@@ -26,6 +26,7 @@ from perception.bayes.inference.reservoir import add_crosses, copy_reservoir
 from perception.bayes.inference.track_labels import drop_track, hold, may_become, merge_duplicates
 from perception.bayes.memory.parameters import (
     CENTRE_VARIANCE_MAX_M2,
+    CERTAIN_PROBABILITY,
     CORNER_MISS_SHARE,
     DOUBT_PROBABILITY,
     DOUBTED_DISPERSION_SHARE,
@@ -33,7 +34,6 @@ from perception.bayes.memory.parameters import (
     ESTABLISH_PROBABILITY,
     ESTABLISH_ROOT_M,
     FIT_LEAD_SIGMAS2,
-    FIT_ROUNDS,
     FIT_SOFTNESS,
     FITTED_REFINEMENTS,
     IN_WALL_NAT,
@@ -41,19 +41,20 @@ from perception.bayes.memory.parameters import (
     LINE_LENGTH_MIN_M,
     LINE_PRIOR_NAT,
     LOST_NAT,
+    MODEL_CHECK_EVERY,
     OTHER_FIT_STEPS,
     PLACED_STRAY_MAX_M,
     RANGE_VARIANCE_MIN_M2,
-    READINGS_MIN,
+    REPLACING_LINE_HITS_MIN,
     ROOT_CORRELATION_MAX,
-    SOME_REFINEMENTS,
     SWITCH_LEAD_NAT,
     SWITCH_ROOT_M,
     SWITCH_UNSEEN,
+    TENTATIVE_FIT_STEPS,
     TRACK_FIT_STEPS,
+    TRACK_READINGS_MIN,
     UNSURE_ROOT_M,
 )
-from perception.bayes.memory.polygon_parameters import POLYGON_HITS_MIN
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import (
     CONFIRMED,
@@ -68,7 +69,6 @@ from perception.bayes.tracks.model_check import check_model, count_names, is_car
 from perception.bayes.tracks.naming import update_name, withdraw_overlapping
 from perception.bayes.tracks.track_selection import choose_circle, is_waiting
 from perception.kernel import kernel
-from perception.shared_numbers import CERTAIN_PROBABILITY
 
 
 @kernel
@@ -82,7 +82,7 @@ def fit_start(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> 
     """
     fit = s[0].scratch.circle_fit
     noise = noise_variance(s, p)
-    steps = FIT_ROUNDS if track.status == TENTATIVE else TRACK_FIT_STEPS
+    steps = TENTATIVE_FIT_STEPS if track.status == TENTATIVE else TRACK_FIT_STEPS
     if not fit_circle(
         s[0].scratch.readings[:n],
         (track.x, track.y, track.radius),
@@ -266,7 +266,7 @@ def compare_alternatives(
             track.leads[k] = v - track.log_likelihood_ratio
             if v > track.log_likelihood_ratio + max(prior, 0.0) + SWITCH_LEAD_NAT:
                 said = s[0].scratch.line_score
-                if said.hits >= POLYGON_HITS_MIN and said.high - said.low > LINE_LENGTH_MIN_M:
+                if said.hits >= REPLACING_LINE_HITS_MIN and said.high - said.low > LINE_LENGTH_MIN_M:
                     enter_line(s, s[0].scratch.line_fit, track.x, track.y, said)
                 return False
         else:
@@ -327,7 +327,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     track.unseen = 0
     track.refinements += 1
     s[0].refinements += 1
-    if n < READINGS_MIN:
+    if n < TRACK_READINGS_MIN:
         drop_track(track)
         return
     x, y = track.x, track.y
@@ -342,7 +342,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
         compare_rays(s, p, track, n)
     careful = is_careful(s, tracks, p)
     add_residuals(s, tracks, p, t, n, careful)
-    is_due = track.is_named == 0 or track.refinements % SOME_REFINEMENTS == 0
+    is_due = track.is_named == 0 or track.refinements % MODEL_CHECK_EVERY == 0
     if track.kind < p[0].model_count and is_due:
         track.outline_lead = outline_lead(s, p, track, n)
         track.round_lead = round_lead(s, p, n)

@@ -9,19 +9,23 @@ so that none waits for more than `PASSED_OVER_MAX` quanta and one for each other
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from perception.bayes.memory.elements import MAX_POLYGONS
 from perception.bayes.memory.parameters import (
-    ESTABLISH_HITS,
+    CERTAIN_PROBABILITY,
     FINAL_VALUE,
     PASSED_OVER_MAX,
+    RESERVOIR_OFFSET,
     UNSURE_FACTOR,
     UNSURE_ROOT_M,
 )
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import FREE, AnyTrack, CircleTrack, CircleTracks, StateRecord
 from perception.kernel import kernel
-from perception.shared_numbers import BEYOND_ALL, CERTAIN_PROBABILITY
+
+OVERDUE: Final = 1e9
+"""Priority of a track that was passed over more than `PASSED_OVER_MAX` times."""
 
 
 @kernel
@@ -41,7 +45,7 @@ def unseen_evidence(track: AnyTrack, idle_firings: int, threshold: float, weight
     weight : float
         Factor.
     """
-    v: float = weight * (track.unseen / (track.reservoir + ESTABLISH_HITS))
+    v: float = weight * (track.unseen / (track.reservoir + RESERVOIR_OFFSET))
     if track.idle_firings > idle_firings and track.final_refinements > 0:
         v += threshold + FINAL_VALUE
     return v
@@ -82,7 +86,7 @@ def priority(s: StateRecord, p: SettingsRecord, value: float, track: CircleTrack
         The circle.
     """
     if track.passed_over > PASSED_OVER_MAX:
-        return BEYOND_ALL + track.passed_over
+        return OVERDUE + track.passed_over
     return value * p[0].range_max_m / (p[0].range_max_m + math.hypot(track.x - s[0].ring_x, track.y - s[0].ring_y))
 
 
@@ -151,7 +155,7 @@ def choose_polygon(s: StateRecord, p: SettingsRecord, threshold: float) -> int:
         if track.status != FREE:
             v = unseen_evidence(track, p[0].idle_firings, threshold, 1.0)
         if v > threshold:
-            v = BEYOND_ALL + track.passed_over if track.passed_over > PASSED_OVER_MAX else v
+            v = OVERDUE + track.passed_over if track.passed_over > PASSED_OVER_MAX else v
             track.passed_over += 1
             if v > best:
                 best = v

@@ -15,7 +15,6 @@ from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import ESTABLISHED, CircleTracks
 from perception.bayes.memory.wall_records import CORNERS_MAX, MAX_WALLS, Wall, WallMap
 from perception.kernel import kernel
-from perception.shared_numbers import LIKELY
 
 NOWHERE, FOOT, BEAM_EDGE = range(3)
 """Where an echo comes from."""
@@ -28,26 +27,19 @@ SLANTING_MIN_COS: Final = 0.25
 """Cosine between axis and normal beyond which nothing is known of a slanting wall's echo."""
 SPAN_MARGIN_M: Final = 0.09
 """A wall explains a reading as far as this beyond the ends of its spans: a bin and a half."""
-PLACE_SLACK_M: Final = 0.05
-"""Uncertainty of the place of a wall's end, a known circle or an edge: a range that is longer by this, beyond its
-error, has passed, and a circle's centre so far outside the beam may still answer."""
-END_MARGIN_M: Final = 0.15
-"""What lies nearer than this to the end of a wall is the end itself: corners are farther beyond it, and what shows
-how walls answer is farther inside."""
-SURE_SHARE: Final = 0.1
-"""A share up to this of passes in a place's weight, or of a line's variance in a range's, leaves what is measured
-sure."""
-EDGE_SIGMA_M: Final = 0.1
-"""Uncertainty of an edge along its wall and across it, before its echoes: after a move by as much it is another
-place, and a range longer than to it by this passed it."""
-SURE_SPAN_WEIGHT: Final = 6.0
-"""Least echoes of a new wall and score of its candidate, and least weight of its span or of one that a corner proves;
-the places of such a span are sure to be its wall's."""
+CIRCLE_MARGIN_M: Final = 0.05
+"""Distance of a circle's centre outside the beam at which it may still answer."""
+END_SLACK_M: Final = 0.05
+"""Uncertainty of the place of a wall's end."""
 CORNER_SLACK_M: Final = 0.03
-"""Uncertainty of the place of a corner: the greatest of a point that its echoes may show, and of echoes before a
-line."""
+"""Uncertainty of the place of a corner."""
+HIDING_PROBABILITY: Final = 0.9
+"""Least probability of a round object without a name that hides what lies behind it, and that explains a wall's
+echoes."""
 ONLY_NAMED: Final = 2.0
 """A probability that only named circles have."""
+WENT_ON_M: Final = 0.05
+"""A range longer than to a wall, or to where the beam's edge meets it, by this beyond the error has passed it."""
 STRAIGHT_CHI2: Final = 60.0
 """A span of more evidence than this and of `FIRM_WEIGHT` is straight beyond doubt."""
 FIRM_WEIGHT: Final = 20.0
@@ -55,7 +47,7 @@ FIRM_WEIGHT: Final = 20.0
 MIRRORS_SILENCES: Final = 20.0
 """So many silences of beam edges, with so few echoes, show mirrors."""
 HEARD_REACH_M: Final = 3.0
-"""Farthest along its line, from a wall's ends or a candidate's echo, at which readings count."""
+"""Farthest beyond the ends of its wall that a corner is looked for among the echoes."""
 EDGES_LEAD: Final = 4.0
 """See `EDGES_SHARE`: a lead in echoes, so that the first few decide nothing."""
 EDGES_SHARE: Final = 0.25
@@ -320,14 +312,14 @@ def is_from_circle(room: WallMap, tracks: CircleTracks, q: Reading, p: SettingsR
         e = q.range_m - d + track.radius
         if e < -slack or e > slack + track.radius:
             continue
-        if dx * q.axis_x + dy * q.axis_y >= p[0].cos_may_answer * d - PLACE_SLACK_M and e < slack:
+        if dx * q.axis_x + dy * q.axis_y >= p[0].cos_may_answer * d - CIRCLE_MARGIN_M and e < slack:
             return True
         if edges:
             ex, ey = edge_direction(q, dx, dy, p)
             reach = dx * ex + dy * ey
             half = track.radius**2 - d * d + reach * reach
-            if half > -PLACE_SLACK_M * track.radius:
-                return abs(q.range_m - reach + math.sqrt(max(half, 0.0))) < slack + PLACE_SLACK_M
+            if half > -CIRCLE_MARGIN_M * track.radius:
+                return abs(q.range_m - reach + math.sqrt(max(half, 0.0))) < slack + CIRCLE_MARGIN_M
     return False
 
 
@@ -349,7 +341,7 @@ def is_hidden(tracks: CircleTracks, q: Reading, x: float, y: float) -> bool:
     d2 = dx * dx + dy * dy
     for t in range(len(tracks)):
         track = tracks[t]
-        if track.status != ESTABLISHED or (track.is_named == 0 and track.probability < LIKELY):
+        if track.status != ESTABLISHED or (track.is_named == 0 and track.probability < HIDING_PROBABILITY):
             continue
         cx = track.x - q.x
         cy = track.y - q.y
@@ -366,7 +358,7 @@ def is_from_end(room: WallMap, wall: Wall, q: Reading, p: SettingsRecord) -> boo
     for k in range(2 * wall.span_count):
         span = wall.spans[k // 2]
         x, y = wall_point(wall, span.low if k % 2 == 0 else span.high)
-        if is_from_point(room, q, x, y, PLACE_SLACK_M, p):
+        if is_from_point(room, q, x, y, END_SLACK_M, p):
             return True
     return False
 

@@ -9,18 +9,18 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.memory.parameters import OTHER_FIT_STEPS, SYSTEMATIC_M
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.wall_records import Wall
 from perception.bayes.walls.bins import is_covered, mean_error, middle_of
 from perception.bayes.walls.contact import wall_normal, wall_point
 from perception.kernel import kernel
-from perception.shared_numbers import BEYOND_ALL
 
 BARREL_RADIUS_M: Final = 0.7
 """Radius of the largest barrel: a wall must explain its echoes better than such a round object."""
 DRUM_RADIUS_M: Final = 0.3
 """Radius of a drum, the other round object that a wall must exceed."""
+RIVAL_STEPS: Final = 4
+"""Steps of the fit of a rival."""
 RIVAL_OFF_M: Final = 0.2
 """Standard deviation of a rival's nearest point across the line, before the echoes."""
 RIVAL_ALONG_M: Final = 0.5
@@ -33,8 +33,14 @@ OUT_OF_BEAM_CHI2: Final = 4.0
 """Evidence of an echo whose beam does not contain the round object's centre."""
 FLAT_BINS_MIN: Final = 4
 """With fewer bins a curve does not stand out from noise."""
+MISFIT_UNKNOWN: Final = 1e9
+"""The misfit of fewer bins."""
+SURE_SPAN_WEIGHT: Final = 6.0
+"""Least weight of a span of a new wall, or of one that a corner proves; its places are sure to be its wall's."""
 LINE_MISFIT_MAX: Final = 2.5
 """Greatest χ² of the line of a new wall, and of a reported one, for each degree of freedom."""
+SYSTEMATIC_M: Final = 0.005
+"""Error that the mean of many readings keeps."""
 SPAN_CHI2_MIN: Final = -2.0
 """Least evidence of each single span."""
 WALL_MIN_M: Final = 0.5
@@ -104,7 +110,7 @@ def circle_chi2(wall: Wall, first: int, end: int, radius: float, p: SettingsReco
     behind = radius
     nx, ny = wall_normal(wall)
     chi2 = 0.0
-    for step in range(OTHER_FIT_STEPS + 1):
+    for step in range(RIVAL_STEPS + 1):
         if step == 3 and chi2 > limit:
             break
         chi2 = 0.0
@@ -125,9 +131,9 @@ def circle_chi2(wall: Wall, first: int, end: int, radius: float, p: SettingsReco
                 reach = math.sqrt(across * across + beside * beside)
                 e = d - reach + radius
                 w = 1.0 / (1.0 / of.precision + SYSTEMATIC_M**2)
-                if step < OTHER_FIT_STEPS:
+                if step < RIVAL_STEPS:
                     chi2 += min(STRAY_CHI2, w * e * e)
-                if step == OTHER_FIT_STEPS:
+                if step == RIVAL_STEPS:
                     q = of.newest
                     dx = x + behind * nx - q.x
                     dy = y + behind * ny - q.y
@@ -142,7 +148,7 @@ def circle_chi2(wall: Wall, first: int, end: int, radius: float, p: SettingsReco
                     h_bb += w * jb * jb
                     g_a += w * ja * e
                     g_b += w * jb * e
-        if step < OTHER_FIT_STEPS:
+        if step < RIVAL_STEPS:
             det = h_aa * h_bb - h_ab * h_ab
             along += (h_bb * g_a - h_ab * g_b) / det
             behind += (h_aa * g_b - h_ab * g_a) / det
@@ -168,7 +174,7 @@ def flatness(wall: Wall, first: int, end: int, p: SettingsRecord) -> tuple[float
     """
     line, n = line_chi2(wall, first, end)
     if n < FLAT_BINS_MIN:
-        return 0.0, BEYOND_ALL
+        return 0.0, MISFIT_UNKNOWN
     circle = circle_chi2(wall, first, end, BARREL_RADIUS_M, p, line + EXACT_BELOW_CHI2)
     if circle < line + EXACT_BELOW_CHI2:
         circle = min(circle, circle_chi2(wall, first, end, DRUM_RADIUS_M, p, math.inf))

@@ -11,8 +11,8 @@ from typing import Final
 
 import numpy as np
 
+from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import Reading
-from perception.bayes.memory.parameters import FIT_ROUNDS
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import Memory, StateRecord
 from perception.bayes.memory.wall_records import (
@@ -30,20 +30,18 @@ from perception.bayes.walls.contact import (
     FOOT,
     NOWHERE,
     SLANTING_MIN_COS,
-    SURE_SPAN_WEIGHT,
     contact,
     edges_answer,
     line_variance,
     tolerance,
     wall_normal,
 )
-from perception.bayes.walls.evidence import LINE_MISFIT_MAX, SPAN_CHI2_MIN, WALL_MIN_M
+from perception.bayes.walls.evidence import LINE_MISFIT_MAX, SPAN_CHI2_MIN, SURE_SPAN_WEIGHT, WALL_MIN_M
 from perception.bayes.walls.fit import fit_walls
-from perception.bayes.walls.numbers import HEAVY_SPAN_MIN, number_spans
+from perception.bayes.walls.numbers import number_spans
 from perception.bayes.walls.support import copy_near, support
 from perception.kernel import kernel
 from perception.records import Structured
-from perception.shared_numbers import FAR
 
 CANDIDATES_MAX: Final = 8
 """Lines that are scored for one echo."""
@@ -57,6 +55,8 @@ TANGENT_MAX_COS: Final = 0.9
 """Greatest difference of two ranges, as a share of the sensors' distance: beyond, a wall is seen end-on."""
 EDGE_NORMAL_MIN_COS: Final = 0.8
 """Least cosine between the axis and the normal of a wall from two beam edges."""
+NEW_WALL_ECHOES_MIN: Final = 6.0
+"""Least score of a candidate, as of `perception.bayes.walls.support`, and least echoes of a new wall."""
 NEW_WALL_CHI2_MIN: Final = 9.0
 """Least evidence of a new wall's span."""
 NEW_WALL_PASSES_MAX: Final = 0.35
@@ -68,6 +68,10 @@ NEW_WALL_SLOPE_VARIANCE: Final = 0.04**2
 KNOWN_SIGMA_M: Final = 0.06
 """Readings that touch a candidate where it is known less well than this do not count: what lies there by chance would
 turn it, by a long lever."""
+FIT_ROUNDS: Final = 3
+"""Fits of a new wall, each with the readings that the one before explains."""
+REPLACED_WEIGHT_MAX: Final = 12.0
+"""A wall of less weight gives way to a new one where there are too many."""
 
 
 @kernel
@@ -137,7 +141,7 @@ def find_near(s: StateRecord, p: SettingsRecord, newest: int) -> int:
             copy_near(room.recent[j], s[0].scratch.near_readings, n)
             n += 1
             free += room.recent[j].is_free
-    return n if free > SURE_SPAN_WEIGHT else 0
+    return n if free > NEW_WALL_ECHOES_MIN else 0
 
 
 @kernel
@@ -159,7 +163,7 @@ def best_line(s: StateRecord, p: SettingsRecord, newest: int) -> bool:
     wall.origin_y = q.y
     wall.slope = 0.0
     choices = 4 if edges_answer(room) else 2
-    best = SURE_SPAN_WEIGHT
+    best = NEW_WALL_ECHOES_MIN
     best_x = 0.0
     best_y = 0.0
     best_c = 0.0
@@ -192,7 +196,7 @@ def best_line(s: StateRecord, p: SettingsRecord, newest: int) -> bool:
     wall.variance_offset = NEW_WALL_VARIANCE_M2
     wall.covariance = 0.0
     wall.variance_slope = NEW_WALL_SLOPE_VARIANCE
-    return best > SURE_SPAN_WEIGHT
+    return best > NEW_WALL_ECHOES_MIN
 
 
 @kernel
@@ -274,7 +278,7 @@ def is_wall(s: StateRecord) -> bool:
 def fit_candidate(memory: Memory, p: SettingsRecord) -> bool:
     """Fit the candidate, whose line is known roughly, to the recent readings; return whether it is a wall."""
     for _ in range(FIT_ROUNDS):
-        if enter_recent(memory.s, p) < SURE_SPAN_WEIGHT:
+        if enter_recent(memory.s, p) < NEW_WALL_ECHOES_MIN:
             return False
         fit_walls(memory.s, p, CANDIDATE, CANDIDATE + 1, 1)
     return is_wall(memory.s)
@@ -299,7 +303,7 @@ def try_wall(memory: Memory, p: SettingsRecord, newest: int) -> bool:
         walls: Structured = memory.state["room"]["walls"][0]
         weight = walls["weight"][:MAX_WALLS]
         slot = int(np.argmin(weight))
-        if weight[slot] < min(walls["weight"][CANDIDATE], HEAVY_SPAN_MIN):
+        if weight[slot] < min(walls["weight"][CANDIDATE], REPLACED_WEIGHT_MAX):
             walls[slot] = walls[CANDIDATE]
             number_spans(memory.s, slot)
     end_candidate(memory.s, is_new)

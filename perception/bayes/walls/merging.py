@@ -23,13 +23,13 @@ from perception.bayes.memory.wall_records import (
 from perception.bayes.walls.bins import HALF, clear_wall, free, is_covered, middle_of
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
-    EDGE_SIGMA_M,
     FOOT,
+    HIDING_PROBABILITY,
     NOWHERE,
     ONLY_NAMED,
-    PLACE_SLACK_M,
     SAME_SIGMAS,
     SPAN_MARGIN_M,
+    WENT_ON_M,
     contact,
     corner_of,
     edges_answer,
@@ -40,12 +40,10 @@ from perception.bayes.walls.contact import (
     line_variance,
     tolerance,
 )
-from perception.bayes.walls.corners import ALONE_LEAD
 from perception.bayes.walls.evidence import FLAT_BINS_MIN
 from perception.bayes.walls.fit import fit_walls
 from perception.kernel import kernel
 from perception.records import Structured
-from perception.shared_numbers import LIKELY
 
 SAME_TURN_RAD: Final = 0.14
 """Greatest angle between two parts of a wall."""
@@ -53,6 +51,8 @@ SAME_WITHIN_M: Final = 1.0
 """Distance from the other's spans within which they are compared."""
 SAME_SLACK_M: Final = 0.025
 """Greatest distance between two walls that are one, beyond `SAME_SIGMAS`."""
+SAME_SHARE: Final = 2
+"""So many times more bins must agree than differ."""
 EXPLAINED_SHARE: Final = 0.6
 """A wall ends when others explain this share of its bins, or fewer than `FLAT_BINS_MIN` are its own."""
 MERGED_MISFIT_MAX: Final = 3.0
@@ -61,6 +61,8 @@ EDGE_BINS: Final = 24
 """A frame moves when readings come so near its first or its last bin."""
 FRAME_TURN_MAX: Final = 0.02
 """A frame turns when the line is turned against it by more than this, rad."""
+HIDDEN_WITHIN_M: Final = 0.1
+"""What lies this far inside another wall's ends, and `WENT_ON_M` behind it, is not heard."""
 
 
 @kernel
@@ -87,7 +89,7 @@ def are_one(main: Wall, part: Wall) -> bool:
             same += 1
         else:
             other += 1
-    return same > ALONE_LEAD * other
+    return same > SAME_SHARE * other
 
 
 @kernel
@@ -197,8 +199,8 @@ def is_from_wall(room: WallMap, wall: Wall, q: Reading, p: SettingsRecord) -> bo
         slack = tolerance(room, wall, along, expected, dot)
         if abs(error) < slack and is_on_span(wall, along, SPAN_MARGIN_M):
             return True
-        is_certain = kind == FOOT and dot >= p[0].cos_must_answer and is_on_span(wall, along, -EDGE_SIGMA_M)
-        if is_certain and error > slack + PLACE_SLACK_M:
+        is_certain = kind == FOOT and dot >= p[0].cos_must_answer and is_on_span(wall, along, -HIDDEN_WITHIN_M)
+        if is_certain and error > slack + WENT_ON_M:
             return True
     return is_from_end(room, wall, q, p)
 
@@ -264,7 +266,7 @@ def drop_explained(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, turn
         count += 1
         # A barrel's side is a wall's until it is heard from farther round.
         is_straight = is_on_straight_span(room.walls[own], middle_of(b))
-        least = ONLY_NAMED if is_straight else LIKELY
+        least = ONLY_NAMED if is_straight else HIDING_PROBABILITY
         is_taken = is_from_circle(room, tracks, of.newest, p, least)
         # From afar a wall's echoes are as long as those of the corner in which it ends.
         is_taken = is_taken or (not is_straight and corner_of(room, of.newest, p) >= 0)

@@ -15,13 +15,15 @@ from perception.bayes.memory.parameters import RANGE_VARIANCE_MIN_M2, READINGS_M
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import StateRecord
 from perception.bayes.memory.wall_records import MAX_WALLS, WALL_BINS, Wall, WallMap
-from perception.bayes.walls.contact import SURE_SHARE, line_variance, range_sigma
+from perception.bayes.walls.contact import line_variance, range_sigma
 from perception.kernel import kernel
 
 PRIOR_ECHOES: Final = 6.0
 """The estimate of recognition counts as so many echoes at each of `PRIOR_RANGES_M`."""
 PRIOR_RANGES_M: Final = (0.5, 1.5, 3.0)
 """Ranges at which the estimate of recognition is taken for known."""
+SURE_SHARE: Final = 0.1
+"""Greatest variance of a wall's line, as a share of the range's, at which an error of the range is noise."""
 CHANGE_MIN: Final = 0.1
 """Least change of a variance that is applied."""
 

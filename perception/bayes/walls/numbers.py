@@ -14,11 +14,6 @@ from perception.kernel import kernel
 
 SPAN_MIN_M: Final = 0.29
 """Least length of a span that is reported, and that gets a number."""
-PROOF_ECHOES: Final = 5.0
-"""Least echoes of a corner that proves its walls, of an edge between mirrors that is sure whatever its walls are, and
-of each of two spans that are evidence together."""
-HEAVY_SPAN_MIN: Final = 12.0
-"""Least weight of the first wall's heaviest span; where there are too many walls, one of less gives way."""
 
 
 @kernel

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from perception.bayes.inference.cross_path import LENGTH_MIN_M
 from perception.bayes.memory.state import ESTABLISHED, Memory
 from perception.bayes.memory.wall_records import MAX_WALLS
-from perception.bayes.walls.contact import EDGES_LEAD, EDGES_SHARE, FIRM_WEIGHT, MIRRORS_SILENCES, SURE_SPAN_WEIGHT
-from perception.bayes.walls.evidence import LINE_MISFIT_MAX, SPAN_CHI2_MIN, WALL_MIN_M
+from perception.bayes.walls.contact import EDGES_LEAD, EDGES_SHARE, FIRM_WEIGHT, MIRRORS_SILENCES
+from perception.bayes.walls.evidence import LINE_MISFIT_MAX, SPAN_CHI2_MIN, SURE_SPAN_WEIGHT, WALL_MIN_M
 from perception.bayes.walls.fit import WALL_WEIGHT_MIN
-from perception.bayes.walls.numbers import HEAVY_SPAN_MIN, PROOF_ECHOES, SPAN_MIN_M
+from perception.bayes.walls.numbers import SPAN_MIN_M
 from perception.bayes.walls.reported_points import EVIDENCE_MAX_NAT, end_at_edges, reach_corners
 from perception.bayes.walls.straight import Straight, kept_bins, straight, straighten
 from perception.kernel import Floats
@@ -25,11 +25,17 @@ WALL_CHI2_MIN: Final = 40.0
 """Least evidence of the best span, or of all together; of the best span of the first wall: where nothing but drums
 stands, thousands of their tangents are tried. With 14 for the others, not a metre more was found in 55 rooms, and two
 false walls across a real corridor."""
+HEAVIEST_SPAN_MIN: Final = 12.0
+"""Least weight of the first wall's heaviest span."""
 LIGHT_MISFIT_MAX: Final = 2.0
 """Greatest χ² for each degree of freedom of a line of less weight than `FIRM_WEIGHT`: it may be the side of a barrel
 that was heard from a few places."""
+TOGETHER_WEIGHT_MIN: Final = 5.0
+"""Weight of two spans, at least, that are evidence together."""
 PRIOR_NAT: Final = -2.0
 """Log prior odds of a line that passed the tests, before its evidence."""
+PROOF_ECHOES: Final = 5.0
+"""Least echoes of a corner that proves its walls."""
 PROOF_LEAD: Final = 3.0
 """The echoes of a corner that proves its walls are more than so many times its passes."""
 THROUGH: Final = 0.8
@@ -167,7 +173,7 @@ def sure_walls(walls: Structured, corners: Structured) -> dict[int, Straight]:
     pairs = np.column_stack([heard["first"], heard["second"]])
     spans = walls["spans"][fitting]
     is_span = np.arange(spans.shape[1]) < walls["span_count"][fitting, None]
-    is_long = is_span & (spans["high"] - spans["low"] >= WALL_MIN_M) & (spans["weight"] >= HEAVY_SPAN_MIN)
+    is_long = is_span & (spans["high"] - spans["low"] >= WALL_MIN_M) & (spans["weight"] >= HEAVIEST_SPAN_MIN)
     kept = kept_bins(walls["bins"])
     if not ((spans["chi2"][is_long] >= WALL_CHI2_MIN).any() or kept.any()):
         return found
@@ -202,7 +208,7 @@ def sure_spans(spans: Structured, chi2: float, is_proven: bool) -> NDArray[np.bo
     heavy = (weight >= least) & (straight > SPAN_CHI2_MIN)
     sure = heavy & (length >= SPAN_MIN_M)
     if sure.any() and not is_proven:
-        together = chi2 if np.count_nonzero(heavy & (weight >= PROOF_ECHOES)) > 1 else -np.inf
+        together = chi2 if np.count_nonzero(heavy & (weight >= TOGETHER_WEIGHT_MIN)) > 1 else -np.inf
         sure &= bool(max(straight[sure].max(), together) >= WALL_CHI2_MIN and length[sure].max() >= WALL_MIN_M)
     return np.asarray(sure)
 

@@ -7,10 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from perception.bayes.walls.contact import EDGE_SIGMA_M, PLACE_SLACK_M
 from perception.bayes.walls.corners import ALONE_LEAD, CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, EDGE_SAME_M
 from perception.bayes.walls.crossing import CORNER_BEYOND_M, CORNER_INSIDE_M
-from perception.bayes.walls.numbers import PROOF_ECHOES
 from perception.bayes.walls.points import ECHOES_MIN
 from perception.bayes.walls.straight import Straight
 from perception.records import Structured
@@ -21,11 +19,21 @@ CORNER_PASSED_SHARE: Final = 0.2
 """No more than this share of the ranges towards a corner that was not heard went on."""
 DOORWAY_MIN_M: Final = 1.05
 """A wall goes on to a corner of which it is the only known side if that is no farther than the narrowest doorway."""
+EDGE_SIGMA_MAX_M: Final = 0.05
+"""Greatest uncertainty of a sure edge."""
+EDGE_LEAD_MIN: Final = 2.0
+"""Least lead of echoes over passes, of an edge where a sure wall ends."""
 EDGE_NEAR_M: Final = 0.18
 """Ranges that passed so near the end of a span, three bins, may have passed beyond the edge."""
+ALONE_EDGE_ECHOES: Final = 5.0
+"""Least echoes of an edge between mirrors that is sure whatever is known of its walls. Other points need
+`ECHOES_MIN`; an edge is heard from near alone."""
 ROUGH_LEAD: Final = 5.0
 """Where slanting walls answer, the echoes of such a point are more than so many times its passes: some of them may be
 a wall's."""
+ONE_WAY_SIGMA_M: Final = 0.1
+"""An edge that its own echoes place no better than this along some axis was heard from one direction: so the wall
+answers where it goes on."""
 ONE_WAY_NAT_MAX: Final = 1.0
 """Greatest log odds of such an edge. In the rooms of `bench standing` four of seven were true."""
 EVIDENCE_MAX_NAT: Final = 12.0
@@ -132,9 +140,9 @@ def end_at_edges(walls: dict[int, Straight], edges: Structured, are_mirrors: boo
             echoes -= float(edge["far_echoes"])
         variance = float(edge["covariance_xx"] + edge["covariance_yy"])
         is_kept = bool(edge["is_kept"] == 1 and edge["echoes"] > passes)
-        if not is_kept and (echoes - passes < ALONE_LEAD or variance > PLACE_SLACK_M**2):
+        if not is_kept and (echoes - passes < EDGE_LEAD_MIN or variance > EDGE_SIGMA_MAX_M**2):
             continue
-        least = PROOF_ECHOES if are_mirrors and edge["is_edge"] == 1 else ECHOES_MIN
+        least = ALONE_EDGE_ECHOES if are_mirrors and edge["is_edge"] == 1 else ECHOES_MIN
         is_sure = is_kept or (echoes >= least and echoes > (ALONE_LEAD if are_mirrors else ROUGH_LEAD) * passes)
         if owner is not None and _ends_at(owner, edge, echoes):
             is_sure = True
@@ -146,7 +154,7 @@ def end_at_edges(walls: dict[int, Straight], edges: Structured, are_mirrors: boo
 def is_one_way(heard: Structured) -> bool:
     """Return whether a point's echoes place it along one direction only; they are a record of `PointInformation`."""
     xx, xy, yy = (float(heard[name]) for name in ("xx", "xy", "yy"))
-    return 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy) < 1.0 / EDGE_SIGMA_M**2
+    return 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy) < 1.0 / ONE_WAY_SIGMA_M**2
 
 
 def _point(corner: Structured, signs: float) -> tuple[float, ...]:

@@ -12,9 +12,9 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.inference.range_fit import FAR
 from perception.bayes.inference.reservoir import copy_reading
 from perception.bayes.memory.elements import Reading
-from perception.bayes.memory.polygon_parameters import GRAZING_COS
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CircleTracks, StateRecord
 from perception.bayes.memory.wall_records import MAX_WALLS, REMEMBERED_MAX, WALL_BINS, Wall, WallMap
@@ -24,10 +24,9 @@ from perception.bayes.walls.contact import (
     EXPLAINED_SIGMAS,
     FIRM_WEIGHT,
     FOOT,
+    HIDING_PROBABILITY,
     NOWHERE,
     SPAN_MARGIN_M,
-    SURE_SHARE,
-    SURE_SPAN_WEIGHT,
     are_mirrors,
     contact,
     edge_direction,
@@ -41,13 +40,12 @@ from perception.bayes.walls.contact import (
     wall_normal,
     wall_point,
 )
+from perception.bayes.walls.evidence import SURE_SPAN_WEIGHT
 from perception.bayes.walls.fit import OFFSET_INFORMATION, SLOPE_SIGMA
 from perception.kernel import Floats, kernel
-from perception.shared_numbers import FAR, LIKELY
 
 RECENT_SPACING_M: Final = 0.08
-"""Least distance between the recent readings of a sensor that nothing explains, and between the remembered ones;
-three times as much between recent ones that something explains."""
+"""Least distance between the recent readings of a sensor that nothing explains, and between the remembered ones."""
 REMEMBERED_FIRST: Final = 1024
 """So many are remembered, those of some 3 m, before a wall is known and whether slanting walls answer, or are
 mirrors: then readings show corners and edges. Where no wall stands, more of them would only fill recordings."""
@@ -64,8 +62,14 @@ SILENCE_NAT: Final = 2.0
 """Evidence of a silence against the place."""
 PLACE_NAT: Final = 10.0
 """Greatest evidence of one place: the errors of its readings are not independent."""
+GRAZING_MIN_COS: Final = 0.05
+"""Least cosine between a sensor's axis and the normal of the wall under review: its line is known well."""
 AS_WELL: Final = 0.3
 """Another wall explains an echo as well if its error, as a share of the greatest explained, is not larger by this."""
+FORGOTTEN_NAT: Final = 2.0
+"""Evidence for a place that was covered when its readings were still remembered."""
+SURE_PASSES: Final = 0.1
+"""A place on a span of `SURE_SPAN_WEIGHT`, and of so small a share of passes, is its wall's."""
 UNHEARD_NAT: Final = 0.35
 """Evidence against a place without readings."""
 SWITCH_NAT: Final = 4.0
@@ -145,7 +149,7 @@ def weigh(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, k: int) -> No
     s2 = 1.0 / SLOPE_SIGMA**2
     for j in range(min(room.remembered_count, REMEMBERED_MAX)):
         q = room.remembered[j]
-        kind, expected, along, cosine = touch(wall, q, p, GRAZING_COS)
+        kind, expected, along, cosine = touch(wall, q, p, GRAZING_MIN_COS)
         b = bin_of(along)
         if kind == NOWHERE or not 0 <= b < WALL_BINS:
             continue
@@ -157,7 +161,7 @@ def weigh(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, k: int) -> No
         slack = tolerance(room, wall, along, expected, cosine)
         of = wall.bins[b]
         is_sure = (
-            of.weight >= SURE_SPAN_WEIGHT and of.passes < SURE_SHARE * of.weight and is_on_span(wall, along, 0.0)
+            of.weight >= SURE_SPAN_WEIGHT and of.passes < SURE_PASSES * of.weight and is_on_span(wall, along, 0.0)
         )
         if e > slack:
             x, y = wall_point(wall, along)
@@ -195,7 +199,7 @@ def stand_by_what_is_forgotten(wall: Wall, evidence: Floats) -> None:
     """Let the bins speak where no reading is remembered."""
     for b in range(WALL_BINS):
         if evidence[b] == 0.0 and wall.bins[b].is_held == 1 and is_covered(wall.bins[b]):
-            evidence[b] = SILENCE_NAT
+            evidence[b] = FORGOTTEN_NAT
 
 
 @kernel
@@ -245,7 +249,7 @@ def is_of_another(room: WallMap, tracks: CircleTracks, q: Reading, p: SettingsRe
             other = abs(q.range_m - expected) / tolerance(room, wall, along, expected, dot)
             if other < min(1.0, error + AS_WELL):
                 return True
-    return is_from_circle(room, tracks, q, p, LIKELY)
+    return is_from_circle(room, tracks, q, p, HIDING_PROBABILITY)
 
 
 @kernel

@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 
 from perception.angles import wrapped
-from perception.bayes.inference.placement import COORDINATE_MAX_M
-from perception.bayes.memory.parameters import STILL_COS, SYSTEMATIC_M
+from perception.bayes.inference.placement import COORDINATE_MAX_M, STANDING_M
+from perception.bayes.memory.parameters import STILL_COS
 from perception.bayes.memory.state import Memory, StateRecord
 from perception.bayes.memory.wall_records import CORNERS_MAX, EDGES_MAX, WALL_BIN_M, WALL_BINS
 from perception.bayes.walls.bins import HALF
@@ -24,9 +24,12 @@ from perception.bayes.walls.report import sure_room
 from perception.kernel import kernel
 from perception.sensor_mounts import RingPose
 
-STOPPED: Final = 0.001
-"""A robot that moved (m) and turned (rad) by less than this between two firings has stopped: bases
+STANDING_RAD: Final = math.acos(STILL_COS)
+STOPPED_M: Final = 0.001
+"""A robot that moved by less than this between two firings, and turned by less than `STOPPED_RAD`, has stopped: bases
 count their way in millimetres. Later it stands while its sensors are where they were, as `placement` has it."""
+STOPPED_RAD: Final = 0.001
+"""Turn in `STOPPED_M`."""
 
 
 def keep_while_standing(memory: Memory, pose: RingPose) -> None:
@@ -61,7 +64,7 @@ def has_just_stopped(s: StateRecord, pose: RingPose) -> bool:
     stop = room.stop
     moved, turned = math.hypot(x - stop.x, y - stop.y), abs(wrapped(yaw - stop.yaw))
     is_standing = stop.is_standing == 1
-    most_m, most_rad = (SYSTEMATIC_M, math.acos(STILL_COS)) if is_standing else (STOPPED, STOPPED)
+    most_m, most_rad = (STANDING_M, STANDING_RAD) if is_standing else (STOPPED_M, STOPPED_RAD)
     if moved <= most_m and turned <= most_rad:
         stop.is_standing = 1
         return not is_standing

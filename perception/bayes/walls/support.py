@@ -12,11 +12,11 @@ from typing import Final
 from perception.bayes.memory.scratch import NearReadings
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.wall_records import IS_FREE, RecentReading, Wall, WallMap
-from perception.bayes.walls.bins import SILENT_PASS
-from perception.bayes.walls.contact import HEARD_REACH_M, SAME_SIGMAS, SLANTING_MIN_COS, edges_answer
+from perception.bayes.walls.contact import SAME_SIGMAS, SLANTING_MIN_COS, edges_answer
 from perception.kernel import kernel, loop_kernel
-from perception.shared_numbers import PASSED_M
 
+TOUCH_REACH_M: Final = 3.0
+"""Readings that touch a candidate farther away than this do not count."""
 SCORE_LEVER: Final = 0.03
 """Further error of a range that supports a candidate, beyond `SAME_SIGMAS`, for each metre along it: its direction is
 uncertain by so many metres over the pair's distance."""
@@ -24,6 +24,10 @@ SCORE_LEVER_MAX_M: Final = 1.5
 """That error grows no more beyond this distance along the candidate."""
 SCORE_EDGE: Final = 0.6
 """Weight of an echo from the beam's edge."""
+SCORE_PASS: Final = 0.7
+"""Weight of a range that passed through."""
+PASS_M: Final = 0.3
+"""A range this much longer than to a candidate passed through it."""
 PASS_WITHIN_M: Final = 0.5
 """A range that passed through counts where it touches the candidate this near the echo."""
 
@@ -76,14 +80,14 @@ def weigh(
         along_edge = nx * (y + reach * ey - oy) - ny * (x + reach * ex - ox)
         expected = distance if is_foot else reach
         away = abs(nx * dy - ny * dx if is_foot else along_edge)
-        touches = (dot >= SLANTING_MIN_COS) & (distance > 0.0) & (away <= HEARD_REACH_M) & (is_foot | edges)
+        touches = (dot >= SLANTING_MIN_COS) & (distance > 0.0) & (away <= TOUCH_REACH_M) & (is_foot | edges)
         e = near.range_m[j] - expected
         slack = SAME_SIGMAS * math.sqrt(variance_m2 + relative * expected * expected)
         slack += SCORE_LEVER * min(away, SCORE_LEVER_MAX_M) / base
         is_near = abs(e) < slack
-        passed = (e > PASSED_M) & (away < PASS_WITHIN_M) & is_foot & (dot >= must)
+        passed = (e > PASS_M) & (away < PASS_WITHIN_M) & is_foot & (dot >= must)
         for_it = near.is_free[j] * (1.0 if is_foot else SCORE_EDGE)
-        against = SILENT_PASS if passed else 0.0
+        against = SCORE_PASS if passed else 0.0
         weight = for_it if is_near else -against
         near.weight[j] = weight if touches else 0.0
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.inference.range_fit import FAR
 from perception.bayes.inference.reservoir import copy_reading
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
@@ -34,13 +35,12 @@ from perception.bayes.memory.wall_records import (
 from perception.bayes.walls.bins import PASSES_KEPT, SILENT_PASS, bin_of, enter_pass, enter_reading
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
-    END_MARGIN_M,
     EXPLAINED_SIGMAS,
     FIRM_WEIGHT,
     FOOT,
     NOWHERE,
     ONLY_NAMED,
-    PLACE_SLACK_M,
+    WENT_ON_M,
     contact,
     distance_and_foot,
     edges_answer,
@@ -55,20 +55,28 @@ from perception.bayes.walls.contact import (
     wall_point,
 )
 from perception.bayes.walls.corners import enter_echo, enter_looks, find_corners, point_of
-from perception.bayes.walls.fit import GAP_MAX_M, fit_walls
+from perception.bayes.walls.fit import fit_walls
 from perception.bayes.walls.initiation import try_wall
 from perception.bayes.walls.merging import drop_explained, merge_walls
 from perception.bayes.walls.noise import add_residual, estimate_noise
 from perception.bayes.walls.points import LONGER_SIGMAS, find_heard_points
 from perception.bayes.walls.review import RECENT_SPACING_M, remember, review
 from perception.kernel import kernel
-from perception.shared_numbers import FAR
 
+GROWTH_M: Final = 0.75
+"""A wall may continue this far beyond its spans."""
+KNOWN_SPACING_M: Final = 0.24
+"""Least distance between the recent readings of a sensor that something explains; see `RECENT_SPACING_M`."""
+FIT_FIRINGS: Final = 2
+"""Each wall is fitted again at every second firing."""
+TIDY_FIRINGS: Final = 8
+"""Firings between two passes over pairs of walls, and between two looks for what is heard on a wall's line."""
 REVIEW_FIRINGS: Final = 4
-"""Firings between two reviews of a wall, a tenth of a millisecond each. In half as many each wall is fitted again; in
-twice as many there is a pass over pairs of walls, and a look for what is heard on a wall's line."""
+"""Firings between two reviews of a wall: a tenth of a millisecond each."""
 BEAM_WALL_WEIGHT_MIN: Final = 40.0
 """Walls of this weight show whether slanting walls answer from the beam's edge."""
+EDGE_WITHIN_M: Final = 0.15
+"""They show it only this far inside their ends."""
 THIN_M: Final = 0.2
 """Echoes of round objects thinner than this start no wall and extend none."""
 LOUD_SHARE: Final = 1.2
@@ -103,10 +111,10 @@ def weaken(room: WallMap, tracks: CircleTracks, q: Reading, own: int, p: Setting
         slack = tolerance(room, wall, along, expected, dot)
         if kind == BEAM_EDGE:
             is_free = own < 0 or k == own
-            if wall.weight > BEAM_WALL_WEIGHT_MIN and is_free and is_on_span(wall, along, -END_MARGIN_M):
+            if wall.weight > BEAM_WALL_WEIGHT_MIN and is_free and is_on_span(wall, along, -EDGE_WITHIN_M):
                 if abs(e) < slack:
                     room.edge_echoes += 1.0
-                elif e > slack + PLACE_SLACK_M:
+                elif e > slack + WENT_ON_M:
                     room.edge_silences += 1.0
         elif dot >= p[0].cos_must_answer and e > slack:
             b = bin_of(along)
@@ -173,7 +181,7 @@ def keep_recent(room: WallMap, sensor: int, q: Reading, is_free: int) -> int:
         As in `RecentReading`.
     """
     is_first = room.kept[sensor] == 0.0
-    spacing = RECENT_SPACING_M if is_free == IS_FREE else 3.0 * RECENT_SPACING_M
+    spacing = RECENT_SPACING_M if is_free == IS_FREE else KNOWN_SPACING_M
     if not is_first and math.hypot(q.x - room.kept_x[sensor], q.y - room.kept_y[sensor]) <= spacing:
         return -1
     room.kept[sensor] = 1.0
@@ -207,7 +215,7 @@ def explain(room: WallMap, q: Reading, p: SettingsRecord, is_known: bool) -> tup
     if own >= 0:
         return own, kind, False
     if not is_known:
-        own, kind, error = explaining_wall(room, q, p, GAP_MAX_M)
+        own, kind, error = explaining_wall(room, q, p, GROWTH_M)
     error_of_point = enter_point(room, q, p, error)
     is_point = error_of_point < 1.0
     if not is_point:
@@ -274,16 +282,16 @@ def update_walls(memory: Memory, p: SettingsRecord, m: int) -> None:
     """Update the walls by the `m` readings of the firing that `observe` has processed."""
     newest = enter_firing(memory.s, memory.tracks, p, m)
     firings: int = memory.firings.item()
-    fit_walls(memory.s, p, firings % REVIEW_FIRINGS // 2, MAX_WALLS, REVIEW_FIRINGS // 2)
+    fit_walls(memory.s, p, firings % FIT_FIRINGS, MAX_WALLS, FIT_FIRINGS)
     is_new = newest >= 0 and try_wall(memory, p, newest)
-    turn, phase = divmod(firings, 2 * REVIEW_FIRINGS)
+    turn, phase = divmod(firings, TIDY_FIRINGS)
     if phase == 0 or is_new:
         merge_walls(memory, p)
-    if phase == 2 * REVIEW_FIRINGS // 3:
+    if phase == TIDY_FIRINGS // 3:
         drop_explained(memory.s, memory.tracks, p, turn)
-    elif phase == 2 * REVIEW_FIRINGS * 2 // 3:
+    elif phase == TIDY_FIRINGS * 2 // 3:
         find_corners(memory.s)
-    elif phase == 2 * REVIEW_FIRINGS - 1:
+    elif phase == TIDY_FIRINGS - 1:
         find_heard_points(memory, p, turn)
     if phase % REVIEW_FIRINGS == 1:
         review(memory.s, memory.tracks, p, firings // REVIEW_FIRINGS)

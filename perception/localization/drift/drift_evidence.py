@@ -14,13 +14,12 @@ from typing import Final
 
 from config.robot import RingConfig
 from perception.kernel import Floats, kernel
-from perception.localization.drift.landmark_association import MARGIN_RAD, OWN_M, bearing_variance
+from perception.localization.drift.landmark_association import MARGIN_RAD, MARGIN_SIGMAS, OWN_M, bearing_variance
 from perception.localization.drift.landmark_filter import innovation_variance, rows_used
 from perception.localization.drift.landmark_ranges import has_moved_since
 from perception.localization.drift.landmark_state import FIRST, EstimateRecord, SonarModel
 from perception.localization.drift.landmark_tracker import LandmarkTracker
 from perception.sensor_mounts import RingPose
-from perception.shared_numbers import OUTLIER_SIGMAS
 
 OTHER_PER_M: Final = 0.05
 """Density (1/m) of the ranges that are of something else than the landmarks in the beam, under both hypotheses: it
@@ -78,7 +77,7 @@ def may_be_in_beam(
     if dx == 0.0 and dy == 0.0:
         return False
     ax, ay = math.cos(axis), math.sin(axis)
-    margin = MARGIN_RAD + OUTLIER_SIGMAS * math.sqrt(bearing_variance(covariance, i, dx, dy))
+    margin = MARGIN_RAD + MARGIN_SIGMAS * math.sqrt(bearing_variance(covariance, i, dx, dy))
     return abs(math.atan2(ax * dy - ay * dx, ax * dx + ay * dy)) < half_angle + margin
 
 

@@ -17,7 +17,6 @@ import numpy as np
 
 from drivers.messages import IDENTITY, Pose, wrap_angle
 from perception.kernel import Floats
-from perception.localization.drift.landmark_association import OWN_M
 
 PLACE_SIGMA_M: Final = 0.4
 """Standard deviation of a slip's shift before the echoes."""
@@ -33,14 +32,19 @@ PAIR_GATE: Final = 9.2
 """χ² of two degrees of freedom that a true pair exceeds in one of a hundred cases."""
 JOINT_GATE: Final = (0.0, 9.2, 13.3, 16.8, 20.1, 23.2, 26.2, 29.1, 32.0, 34.8, 37.6, 40.3, 43.0)
 """The same of two degrees of freedom for each pair; the index is the number of pairs."""
+PAIRED_ECHOES_MAX: Final = len(JOINT_GATE) - 1
+"""Echoes that are paired at most: `JOINT_GATE` has no more values."""
 PAIRS_MIN: Final = 4
 """A pairing of fewer echoes than this is none."""
 PAIRED_SHARE: Final = 0.6
 """A pairing of a smaller share of the echoes is none."""
 BRANCHES_MAX: Final = 80
 """Branches that are followed at most: bounds the work."""
+ALIKE_M: Final = 0.15
+"""Two displacements are the same answer if their shifts differ by less than this and their turns by less than
+`ALIKE_RAD`."""
 ALIKE_RAD: Final = math.radians(6.0)
-"""Difference of turns in `OWN_M`."""
+"""Difference of turns in `ALIKE_M`."""
 
 GAIN_MIN: Final = 5.0
 """A landmark's squared innovations must fall by so much to be clearly better."""
@@ -96,7 +100,7 @@ def find_displacement(echoes: Sequence[Echo], discs: Sequence[Disc], half_angle:
     Parameters
     ----------
     echoes : sequence of Echo
-        Of one cycle of the ring; the nearest are used, as many as `JOINT_GATE` has values for.
+        Of one cycle of the ring; the nearest `PAIRED_ECHOES_MAX` are used.
     discs : sequence of Disc
         The landmarks.
     half_angle : float
@@ -157,7 +161,7 @@ def share_improved(found: Displacement, echoes: Sequence[Echo], discs: Sequence[
 
 
 def _nearest(echoes: Sequence[Echo]) -> list[Echo]:
-    return sorted(echoes, key=lambda echo: echo.range_m)[: len(JOINT_GATE) - 1]
+    return sorted(echoes, key=lambda echo: echo.range_m)[:PAIRED_ECHOES_MAX]
 
 
 def _squared(pose: Pose, echo: Echo, disc: Disc, half_angle: float) -> float:
@@ -168,7 +172,8 @@ def _squared(pose: Pose, echo: Echo, disc: Disc, half_angle: float) -> float:
 
 def _is_alike(one: Pose, other: Pose) -> bool:
     return (
-        math.hypot(one.x - other.x, one.y - other.y) < OWN_M and abs(wrap_angle(one.theta - other.theta)) < ALIKE_RAD
+        math.hypot(one.x - other.x, one.y - other.y) < ALIKE_M
+        and abs(wrap_angle(one.theta - other.theta)) < ALIKE_RAD
     )
 
 

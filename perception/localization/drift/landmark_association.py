@@ -11,14 +11,17 @@ from typing import Final, TypeAlias
 from perception.kernel import Floats, kernel
 from perception.localization.drift.landmark_filter import innovation_variance, rows_used
 from perception.localization.drift.landmark_state import FIRST, EstimateRecord, SonarModel, X, Y
-from perception.shared_numbers import NO_INDEX, OUTLIER_SIGMAS
 
 GATE: Final = 10.8
 """χ² of one degree of freedom that a true reading exceeds in one of a thousand cases."""
 OWN_M: Final = 0.15
-"""A range farther than this from a landmark's is of something else, however uncertain the landmark is; two
-displacements that differ by less, and turn alike by `joint_compatibility.ALIKE_RAD`, are the same answer."""
+"""A range farther than this from a landmark's is of something else, however uncertain the landmark is."""
 MARGIN_RAD: Final = math.radians(1.0)
+MARGIN_SIGMAS: Final = 3.0
+"""This far inside the beam a landmark must answer, and this far outside it may: a fixed part, and standard deviations
+of its bearing."""
+NO_LANDMARK: Final = -1
+"""In place of a landmark's number."""
 HIDING_RADII: Final = 1.1
 """A line of sight this near to a landmark's centre is hidden by it."""
 
@@ -115,7 +118,7 @@ def associate(
     Returns
     -------
     (int, float, bool)
-        The landmark in the beam whose predicted range is nearest in standard deviations, or `NO_INDEX`; the square
+        The landmark in the beam whose predicted range is nearest in standard deviations, or `NO_LANDMARK`; the square
         of that distance; whether another one explains the range, too.
     (int, float, bool)
         The landmark in the beam that is predicted nearest, its range (m), and whether it is surely in the beam.
@@ -123,7 +126,7 @@ def associate(
     x, y, ax, ay = beam
     est = e[0]
     n = rows_used(e)
-    best = second = first = NO_INDEX
+    best = second = first = NO_LANDMARK
     best_nis = second_nis = GATE
     nearest = math.inf
     is_expected = False
@@ -134,7 +137,7 @@ def associate(
         if d <= landmark.radius or dx * ax + dy * ay < 0.0:
             continue
         inside = sonar.half_angle - abs(math.atan2(ax * dy - ay * dx, ax * dx + ay * dy))
-        margin = MARGIN_RAD + OUTLIER_SIGMAS * math.sqrt(bearing_variance(covariance, i, dx, dy))
+        margin = MARGIN_RAD + MARGIN_SIGMAS * math.sqrt(bearing_variance(covariance, i, dx, dy))
         if inside < -margin:
             continue
         predicted = est.range_scale * (d - landmark.radius)
@@ -150,4 +153,4 @@ def associate(
             best, best_nis = i, nis
         elif nis < second_nis:
             second, second_nis = i, nis
-    return best, best_nis, second != NO_INDEX, first, nearest, is_expected
+    return best, best_nis, second != NO_LANDMARK, first, nearest, is_expected

@@ -8,8 +8,8 @@ inverted. Each costs two passes over the covariance.
 from __future__ import annotations
 
 import math
+from typing import Final
 
-from perception.angles import SAME_RAD
 from perception.kernel import Floats, kernel
 from perception.localization.drift.landmark_state import (
     FIRST,
@@ -18,11 +18,15 @@ from perception.localization.drift.landmark_state import (
     OFFSET,
     RANGE,
     SCALE_MAX,
+    SCALE_MIN,
     TURN,
     EstimateRecord,
     X,
     Y,
 )
+
+SMALL_RAD: Final = 1e-6
+"""Below this angle the series of sin a/a is used."""
 
 
 @kernel
@@ -152,7 +156,7 @@ def move_points(e: EstimateRecord, turn: float, gain: Floats, factor: float) -> 
     """
     est = e[0]
     c, s = math.cos(turn), math.sin(turn)
-    if abs(turn) < SAME_RAD:
+    if abs(turn) < SMALL_RAD:
         a, b = 1.0, 0.5 * turn
     else:
         a, b = s / turn, (1.0 - c) / turn
@@ -224,9 +228,9 @@ def correct(e: EstimateRecord, covariance: Floats, innovation: float, variance: 
     est.offset += factor * gain[OFFSET]
     est.offset_correction += factor * gain[OFFSET]
     est.heading_correction += factor * gain[HEADING]
-    est.odometer_scale = min(SCALE_MAX, max(1.0 / SCALE_MAX, est.odometer_scale + factor * gain[ODOMETER]))
+    est.odometer_scale = min(SCALE_MAX, max(SCALE_MIN, est.odometer_scale + factor * gain[ODOMETER]))
     est.turn_scale += factor * gain[TURN]
-    est.range_scale = min(SCALE_MAX, max(1.0 / SCALE_MAX, est.range_scale + factor * gain[RANGE]))
+    est.range_scale = min(SCALE_MAX, max(SCALE_MIN, est.range_scale + factor * gain[RANGE]))
     turn = factor * gain[HEADING]
     move_points(e, turn, gain, factor)
     est.heading += turn

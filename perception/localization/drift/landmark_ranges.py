@@ -11,7 +11,7 @@ from typing import Final
 
 from perception.kernel import Floats, kernel
 from perception.localization.drift.landmark_association import (
-    MARGIN_RAD,
+    NO_LANDMARK,
     associate,
     bearing_variance,
     is_landmark_hidden,
@@ -27,37 +27,49 @@ from perception.localization.drift.landmark_state import (
     SonarModel,
 )
 from perception.sensor_mounts import RingPose, SensorPose
-from perception.shared_numbers import NO_INDEX, NO_RANGE, OUTLIER_SIGMAS, PASSED_M, SPACING
 
 SOFT: Final = 6.25
 """Normalised squared innovation from which on a reading's weight is reduced: its tails are heavier than a bell's."""
 NEAR_M: Final = 0.5
 """A range this near to a landmark's, but outside the gate, is a failure of that landmark."""
+FRESH_M: Final = 0.02
+"""A sensor's readings from poses nearer than this, and turned by less than `FRESH_RAD`, repeat one error of rounding;
+only the first is used."""
+FRESH_RAD: Final = math.radians(1.0)
+"""Turn in `FRESH_M`."""
 NOISE_MEMORY: Final = 0.005
 """Share of one reading in the estimate of the noise."""
 NOISE_MIN: Final = 0.02
 """Least estimate of the noise, as a factor on the nominal variance."""
 NOISE_MAX: Final = 25.0
 """Greatest estimate of the noise, as a factor on the nominal variance."""
+FIT_MEMORY: Final = 0.03
+"""Share of one expected echo in `Estimate.fit_share`."""
+NO_RANGE: Final = -1.0
+"""In place of the range of a landmark that was not heard, m."""
 EDGE_RAD: Final = math.radians(0.2)
 """Standard deviation of where a beam ends."""
+EDGE_SIGMAS: Final = 3.0
+"""That a landmark so far inside was heard, or one so far outside was not, says nothing about its bearing."""
 DROP_OUT: Final = 0.08
 """Share of the expected echoes that a sensor misses."""
 STRAY: Final = 0.02
 """Share of the landmarks outside a beam that are heard, at first: of mirrors none is, many are where a drum answers
 with any part that is in the beam."""
 STRAY_MEMORY: Final = 0.03
-"""Weight of one look in that share, and of one expected echo in `Estimate.fit_share`."""
+"""Weight of one look in that share."""
 WILD_PER_M: Final = 0.01
 """Share of the readings that are of something else, for each metre of range: as many fit a landmark by chance."""
 CURVATURE_MIN: Final = 1e-6
 """With less, as a share of the squared slope, nothing would change."""
+PASSED_M: Final = 0.3
+"""A range this much beyond a landmark's has passed it."""
 
 
 @kernel
 def has_moved_since(last: LastUse, x: float, y: float, axis: float) -> bool:
     """Return whether a sensor at (x, y) (m), axis (rad), has moved or turned enough since its last reading."""
-    return last.is_known == 0 or abs(axis - last.axis) >= MARGIN_RAD or math.hypot(x - last.x, y - last.y) >= SPACING
+    return last.is_known == 0 or abs(axis - last.axis) >= FRESH_RAD or math.hypot(x - last.x, y - last.y) >= FRESH_M
 
 
 @kernel
@@ -164,7 +176,7 @@ def update_with_edge(
     else:
         share, rest = 1.0 - est.stray, est.stray + chance
     learn_stray(e, inside, chance)
-    if (z < -OUTLIER_SIGMAS) if chance < 0.0 else (z > OUTLIER_SIGMAS):
+    if (z < -EDGE_SIGMAS) if chance < 0.0 else (z > EDGE_SIGMAS):
         return
     density = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
     slope = share * density / ((rest + share * inside) * q)
@@ -225,7 +237,7 @@ def update_with_range(
     r: float,
     sonar: SonarModel,
 ) -> int:
-    """Enter the range of one sensor; return the landmark that it is from, or `NO_INDEX`.
+    """Enter the range of one sensor; return the landmark that it is from, or `NO_LANDMARK`.
 
     The reading is from the landmark in the beam whose predicted range is nearest in standard deviations. Where two
     explain it, it is not used. A range that passed a landmark which should have answered moves that out of the beam;
@@ -253,19 +265,19 @@ def update_with_range(
     best, best_nis, is_ambiguous, first, nearest, is_expected = associate(e, covariance, (x, y, ax, ay), r, sonar)
     if (
         is_expected
-        and best == NO_INDEX
+        and best == NO_LANDMARK
         and (r < nearest - NEAR_M or may_answer_instead(e, first, x, y, ax, ay, half_angle, r))
     ):
         is_expected = False
     if is_expected:
-        est.fit_share += STRAY_MEMORY * ((1.0 if best != NO_INDEX else 0.0) - est.fit_share)
-    is_missed = first != NO_INDEX and first != best and r > nearest + PASSED_M and nearest < sonar.range_max
+        est.fit_share += FIT_MEMORY * ((1.0 if best != NO_LANDMARK else 0.0) - est.fit_share)
+    is_missed = first != NO_LANDMARK and first != best and r > nearest + PASSED_M and nearest < sonar.range_max
     if is_missed and not is_landmark_hidden(e, first, x, y):
         update_with_edge(e, covariance, first, mx, my, axis, half_angle, NO_RANGE)
-    elif best == NO_INDEX and is_expected and abs(r - nearest) <= NEAR_M:
+    elif best == NO_LANDMARK and is_expected and abs(r - nearest) <= NEAR_M:
         est.landmarks[first].failures += 1
-    if best == NO_INDEX or is_ambiguous:
-        return NO_INDEX
+    if best == NO_LANDMARK or is_ambiguous:
+        return NO_LANDMARK
     correct_with_range(e, covariance, best, best_nis, mount, r, sonar)
     return best
 
@@ -303,6 +315,6 @@ def update_with_firing(
             continue
         if r >= sonar.range_max:
             r = math.inf
-        if update_with_range(e, covariance, (mx, my, axis), r, sonar) != NO_INDEX:
+        if update_with_range(e, covariance, (mx, my, axis), r, sonar) != NO_LANDMARK:
             used += 1
     return used

@@ -18,21 +18,19 @@ from perception.records import Record, Records
 LANDMARKS_MAX: Final = 72
 """As many as perception has tracks: 48 circles and 24 polygons."""
 
-LANDMARKS_MIN: Final = 2
-"""Landmarks that determine a pose or a map's turn and shift; so many that fail at once let the pose be doubted."""
-SLIP_SHARE: Final = 0.4
-"""With fewer of the expected echoes than this, the wheels may have slipped; where fewer of the landmarks fit clearly
-better after a displacement, some landmarks moved, and not the robot."""
 STRAY_MIN: Final = 5e-4
 """Least value of `Estimate.stray`."""
 STRAY_MAX: Final = 0.9
 """Greatest value of `Estimate.stray`."""
+SCALE_MIN: Final = 0.5
+"""Least scale of odometer and ranges, by which something is divided: those of a real robot are near 1."""
 SCALE_MAX: Final = 2.0
-"""Greatest scale of odometer and ranges; its inverse is the least, by which something is divided: those of a real
-robot are near 1."""
+"""Greatest scale of odometer and ranges."""
 
-HEADING, X, Y, OFFSET, ODOMETER, TURN, RANGE, FIRST = range(8)
-"""Rows of the covariance for the fields of `Estimate`, in their order, and the row of the first landmark's x."""
+HEADING, X, Y, OFFSET, ODOMETER, TURN, RANGE = range(7)
+"""Rows of the covariance for the fields of `Estimate`, in their order; those of the landmarks follow."""
+FIRST: Final = 7
+"""Row of the first landmark's x."""
 ROWS_MAX: Final = FIRST + 2 * LANDMARKS_MAX
 """Rows of the state: that of the robot, and the place of each landmark."""
 
@@ -88,11 +86,11 @@ class Estimate(Record):
     y: Place
     offset: Place
     """True less reported angle from the ring's direction to the direction of travel."""
-    odometer_scale: Annotated[float, Bound(1.0 / SCALE_MAX, SCALE_MAX)]
+    odometer_scale: Annotated[float, Bound(SCALE_MIN, SCALE_MAX)]
     """Reported distance over true distance."""
     turn_scale: Place
     """True turn over reported turn, less 1."""
-    range_scale: Annotated[float, Bound(1.0 / SCALE_MAX, SCALE_MAX)]
+    range_scale: Annotated[float, Bound(SCALE_MIN, SCALE_MAX)]
     """Reported range over true range."""
     count: Annotated[int, up_to(LANDMARKS_MAX)]
     """Landmarks."""

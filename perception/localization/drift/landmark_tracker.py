@@ -10,18 +10,17 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import Pose, wrap_angle
+from perception.angles import ROUNDING_RAD
 from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, bounds
 from perception.kernel import Floats
 from perception.localization.drift.landmark_filter import propagate, rows_used, write_lever
 from perception.localization.drift.landmark_ranges import STRAY, update_with_firing
 from perception.localization.drift.landmark_state import (
     FIRST,
-    LANDMARKS_MIN,
     ODOMETER,
     OFFSET,
     RANGE,
     ROWS_MAX,
-    SLIP_SHARE,
     TURN,
     Estimate,
     SonarModel,
@@ -31,9 +30,10 @@ from perception.localization.drift.landmark_state import (
 from perception.localization.drift.walk_rates import WalkRates
 from perception.records import records, zeros
 from perception.sensor_mounts import RingPose, mounts_array, turned_mounts
-from perception.shared_numbers import ODOMETER_SIGMA, ROUNDING
 
 OFFSET_SIGMA_RAD: Final = math.radians(0.5)
+ODOMETER_SIGMA: Final = 0.03
+"""Standard deviation of the odometer's scale at the start."""
 TURN_SIGMA: Final = 0.01
 """Standard deviation of the scale of turns, and of that of ranges, at the start."""
 HEADING_RATES: Final = (math.radians(0.1) * 2.0 ** (0.5 * np.arange(12.0))) ** 2
@@ -45,8 +45,12 @@ WALK_WINDOW_M: Final = 0.25
 DRIFT_PLACE_WALK: Final = 0.0005**2
 """Variance of a displacement by odometry on each axis, m²/m. A base's distance errs by its scale, which the filter
 finds, and where wheels slip; what is left is below what the echoes show."""
+SLIP_SHARE: Final = 0.4
+"""With fewer of the expected echoes than this, the wheels may have slipped: odometry is then trusted less."""
 FAILURES_DOUBTED: Final = 2
 """Failures in succession of a landmark by which it lets the pose be doubted."""
+LANDMARKS_DOUBTED: Final = 2
+"""So many such landmarks at once let the pose be doubted."""
 RENEWED_SHARE: Final = 0.7
 """Share of the expected echoes that is assumed after a displacement was found."""
 FAILING_M: Final = 0.01
@@ -192,7 +196,7 @@ class LandmarkTracker:
     @property
     def is_doubtful(self) -> bool:
         """Whether several landmarks fail at once, or hardly any echo comes: rather a robot that slipped."""
-        return bool(np.count_nonzero(self._failing()) >= LANDMARKS_MIN or self.e[0].fit_share < SLIP_SHARE)
+        return bool(np.count_nonzero(self._failing()) >= LANDMARKS_DOUBTED or self.e[0].fit_share < SLIP_SHARE)
 
     def _failing(self) -> NDArray[np.bool_]:
         """Return which landmarks have failed so often that they, or the pose, are doubted."""
@@ -230,7 +234,7 @@ class LandmarkTracker:
         c, s = math.cos(theta_before), math.sin(theta_before)
         dx, dy = x - x_before, y - y_before
         ring_turn, travel_turn = wrap_angle(yaw - yaw_before), wrap_angle(theta - theta_before)  # a log may wrap them
-        self.is_synchro = self.is_synchro or abs(wrap_angle(travel_turn - ring_turn)) > ROUNDING
+        self.is_synchro = self.is_synchro or abs(wrap_angle(travel_turn - ring_turn)) > ROUNDING_RAD
         way = math.hypot(dx, dy)
         self._renew_walk(way)
         turn_variance, place_variance = self._rates.rate * way, DRIFT_PLACE_WALK * way

@@ -20,17 +20,7 @@ from drivers.messages import wrap_angle
 from perception.bounds import FINITE, PLACE, bounds, up_to
 from perception.kernel import Floats
 from perception.localization.drift.landmark_filter import remove_landmark
-from perception.localization.drift.landmark_state import (
-    FIRST,
-    HEADING,
-    LANDMARKS_MIN,
-    ODOMETER,
-    OFFSET,
-    RANGE,
-    TURN,
-    X,
-    Y,
-)
+from perception.localization.drift.landmark_state import FIRST, HEADING, ODOMETER, OFFSET, RANGE, TURN, X, Y
 from perception.localization.drift.landmark_tracker import OFFSET_SIGMA_RAD, POSE, LandmarkTracker
 
 FIRST_FIRINGS: Final = 160
@@ -43,6 +33,8 @@ BEGIN_M: Final = 10.0
 """The map is known well enough after this way."""
 AGAIN: Final = 3.0
 """The map is known better after so many times this way, and so on; so is the heading's random walk."""
+LANDMARKS_MIN: Final = 2
+"""Least landmarks that determine a map's turn and shift."""
 ENTERED_AT_ONCE: Final = 8
 """Firings that wait or are kept that are entered with each new one: bounds the work."""
 MOTION_SIGMAS: Final = (math.radians(3.0), 0.05, 0.05)

@@ -20,12 +20,13 @@ from perception.localization.drift.joint_compatibility import (
     find_displacement,
     share_improved,
 )
-from perception.localization.drift.landmark_state import SLIP_SHARE
 from perception.localization.drift.landmark_tracker import POSE, LandmarkTracker
 from perception.sensor_mounts import turned_mounts
 
 CYCLE_M: Final = 0.3
 """Echoes from farther back than this are not of the same place."""
+SLIPPED_SHARE: Final = 0.4
+"""Where fewer of the landmarks fit clearly better after a displacement, some landmarks moved, and not the robot."""
 
 
 def echoes_of_cycle(
@@ -89,6 +90,6 @@ def find_slip(tracker: LandmarkTracker, echoes: list[Echo], half_angle: float, r
         if math.hypot(seen.x, seen.y) < reach_m:
             discs.append(Disc(seen.x, seen.y, radius))
     found = find_displacement(echoes, discs, half_angle)
-    if found is None or share_improved(found, echoes, discs, half_angle) > SLIP_SHARE:
+    if found is None or share_improved(found, echoes, discs, half_angle) > SLIPPED_SHARE:
         return found
     return found._replace(pose=Pose(0.0, 0.0, 0.0))

@@ -19,6 +19,8 @@ from perception.localization.room.room import Room
 
 PRIOR_SIGMA_M: Final = 0.3
 """Deviation of a fitted place from its start, m: along a direction that no range fixes, it stays there."""
+STEP_MAX_M: Final = 0.3
+"""Longest step of the fit, m."""
 
 
 class Stand(NamedTuple):
@@ -100,7 +102,7 @@ def fit_poses(stand: Stand, starts: Floats, turns: Floats, steps: int) -> Fitted
         bx = (error * expected.grad_x).sum(axis=1) + (x0 - x) * PRIOR_SIGMA_M**-2
         by = (error * expected.grad_y).sum(axis=1) + (y0 - y) * PRIOR_SIGMA_M**-2
         dx, dy = (yy * bx - xy * by) / det, (xx * by - xy * bx) / det
-        short = np.minimum(1.0, PRIOR_SIGMA_M / np.maximum(np.hypot(dx, dy), 1e-12))
+        short = np.minimum(1.0, STEP_MAX_M / np.maximum(np.hypot(dx, dy), 1e-12))
         x, y = x + short * dx, y + short * dy
     area = math.log(2.0 * math.pi) - 0.5 * np.log(det)
     return FittedPoses(*(part.reshape(shape) for part in (x, y, theta, ratio.sum(axis=1), area)))

@@ -24,8 +24,10 @@ BACKGROUND_PLACES: Final = 100
 """Places at which the map's ranges are taken."""
 SMOOTH_M: Final = 0.1
 """Standard deviation of the smoothing of their distribution."""
+EVEN_SHARE: Final = 0.1
+"""So much of it is the same at all ranges."""
 HEARD_SHARE_MIN: Final = 0.1
-"""Least share that is heard, and with its complement the greatest; so much of the ranges is spread evenly."""
+"""Least share, and with its complement the greatest."""
 
 
 class Background:
@@ -120,7 +122,5 @@ def _density(ranges: Floats, kernel: Floats, step_m: float) -> Floats:
     total = blurred.sum() * step_m
     even = 1.0 / (len(ranges) * step_m)
     return np.asarray(
-        (1.0 - HEARD_SHARE_MIN) * blurred / total + HEARD_SHARE_MIN * even
-        if total > 0.0
-        else np.full(len(ranges), even)
+        (1.0 - EVEN_SHARE) * blurred / total + EVEN_SHARE * even if total > 0.0 else np.full(len(ranges), even)
     )

@@ -26,15 +26,16 @@ from perception.localization.known_room.pose_particles import HYPOTHESES_MAX, ME
 from perception.localization.known_room.pose_track import LEAST_LOG, SEARCH_LEAST_LOG, PoseTrack, heading_noise
 from perception.localization.known_room.surroundings import make_surroundings
 from perception.localization.localized_pose import LocalizedPose, Status
-from perception.localization.room.range_likelihood import OUTLIERS, RangeModel
+from perception.localization.room.range_likelihood import RangeModel
 from perception.localization.room.room import Room
 from perception.sensor_mounts import mounts_array
-from perception.shared_numbers import EVEN, LIKELY
 
 MAP_NOISE_M: Final = 0.03
 """Noise of a range compared with the map, whose own errors it contains."""
 DROPOUT: Final = 0.15
 """Share of the expected echoes that are missed."""
+OUTLIERS: Final = 0.1
+"""Share of the readings that are of something else than the map."""
 WINDOW_M: Final = 9.0
 """Way over which odometry compounds keyframes for a search."""
 WINDOW_LEAST: Final = 9
@@ -57,6 +58,10 @@ SUSPECT_LOG: Final = 4.5
 """Evidence for a tracked place below which a search looks for a better one, nat: the robot may have been carried."""
 LEAD_LOG: Final = 2.0
 """What a search finds must explain its readings better by this than what is tracked, nat."""
+PLACE_SURE: Final = 0.9
+"""Probability above which a place is the robot's."""
+PLACE_DOUBT: Final = 0.5
+"""Probability below which a tracked place is no longer its own."""
 STATUSES: Final[tuple[Status, ...]] = ("localizing", "tracking", "lost")
 """The statuses; snapshots hold their indices."""
 LOCALIZING, TRACKING, LOST = range(3)
@@ -178,7 +183,7 @@ class KnownRoom:
         if self._status == TRACKING:
             if self._tracked.evidence <= SUSPECT_LOG:
                 self._window_begin = max(self._window_begin, min(self._tracked.peak_at + 1, keyframes.count - 1))
-            elif self.probability > LIKELY and not self._is_named:
+            elif self.probability > PLACE_SURE and not self._is_named:
                 return
         way_m = keyframes.driven_m - self._searched_at_m
         if way_m >= self._pause_m or (keyframes.is_stand and way_m >= STAND_SEARCH_M):
@@ -284,14 +289,14 @@ class KnownRoom:
         before = track.entered
         least_log = LEAST_LOG if track is self._tracked else SEARCH_LEAST_LOG
         readings = track.enter(self._keyframes, self.shares, least_log)
-        is_place = track is self._tracked and float(track.best.share) > LIKELY
-        if readings and is_place and min(track.explains, track.fits) > LIKELY:
+        is_place = track is self._tracked and float(track.best.share) > PLACE_SURE
+        if readings and is_place and min(track.explains, track.fits) > PLACE_SURE:
             self.shares.learn(track.best, readings)
         return track.entered > before
 
     def _is_sure(self, tracked: PoseTrack) -> bool:
         """Return whether what is tracked is the place so surely that another one must overcome a search's chance."""
-        return float(tracked.best.share) * tracked.explains > (EVEN if self._is_named else LIKELY)
+        return float(tracked.best.share) * tracked.explains > (PLACE_DOUBT if self._is_named else PLACE_SURE)
 
     def _are_one(self, tracked: PoseTrack, found: PoseTrack) -> bool:
         """Return whether two tracks are at the same place."""
@@ -317,8 +322,8 @@ class KnownRoom:
         is_chance = heard_before <= -self._search_evidence
         lead = LEAD_LOG - (self._search_evidence if is_sure and is_chance else 0.0)
         ahead = found.gained_since(begin) - tracked.gained_since(begin) if len(tracked) else math.inf
-        is_choice = self._status != TRACKING or float(found.best.share) > EVEN
-        if ahead > lead and is_choice and not (is_same and tracked.explains > EVEN):
+        is_choice = self._status != TRACKING or float(found.best.share) > PLACE_DOUBT
+        if ahead > lead and is_choice and not (is_same and tracked.explains > PLACE_DOUBT):
             self._tracked, self._candidates = found, tracked
             self._status = LOCALIZING if self._status == TRACKING else self._status
             self._is_confirmed = self._is_complete
@@ -338,17 +343,19 @@ class KnownRoom:
         track = self._tracked
         explains = track.explains
         self.probability = (
-            float(track.best.share) * min(explains, track.fits) * (1.0 if self._is_confirmed else LIKELY)
+            float(track.best.share) * min(explains, track.fits) * (1.0 if self._is_confirmed else PLACE_SURE)
         )
-        if self._is_named and explains < EVEN:
+        if self._is_named and explains < PLACE_DOUBT:
             self._refute()
         if not self._is_named:
             self.rivals = track.rivals
         if self._status == TRACKING:
-            if explains < EVEN:
+            if explains < PLACE_DOUBT:
                 self._lose()
         elif self._stage == IDLE:
-            self._status = TRACKING if self.probability > LIKELY else LOST if explains < EVEN else LOCALIZING
+            self._status = (
+                TRACKING if self.probability > PLACE_SURE else LOST if explains < PLACE_DOUBT else LOCALIZING
+            )
             if self._named_at < self._keyframes.count:
                 self._compare_named(explains)
 
@@ -364,7 +371,7 @@ class KnownRoom:
         """
         if not self._is_compared:
             self._is_compared, self._stage = True, DUE
-        elif explains < EVEN and self._window_begin < self._named_at:
+        elif explains < PLACE_DOUBT and self._window_begin < self._named_at:
             self._window_begin, self._stage = self._named_at, DUE
 
     def _lose(self) -> None:

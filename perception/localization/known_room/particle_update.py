@@ -8,7 +8,7 @@ from typing import Final
 from perception.kernel import Floats, kernel
 from perception.localization.known_room.mirror_points import expect_specular
 from perception.localization.known_room.mixed_reflection import Shares, mixed_ratio, range_variance
-from perception.localization.known_room.pose_particles import TEMPER, HypothesesRecord, Particle
+from perception.localization.known_room.pose_particles import HypothesesRecord, Particle
 from perception.localization.known_room.surroundings import (
     Expected,
     Surroundings,
@@ -19,6 +19,9 @@ from perception.records import Records
 
 FIT_STEPS: Final = 2
 """Linear solutions of an update."""
+TEMPER: Final = 0.5
+"""Weight of a reading, in the likelihood and in the fit of the place: errors of the map are common to readings of one
+wall."""
 PARTICLE_SPREAD_M: Final = 1.0
 """Greatest distance of a particle from its hypothesis's mean for which all surfaces in reach are found."""
 COLUMNS: Final = 5

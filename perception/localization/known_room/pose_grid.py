@@ -24,7 +24,6 @@ from perception.localization.known_room.surroundings import Surroundings, expect
 from perception.localization.room.range_likelihood import HEARD_PRIOR
 from perception.localization.room.room import Room
 from perception.records import Record, Records, records, zeros
-from perception.shared_numbers import BLOCK, NO_INDEX
 
 GRID_CELL_M: Final = 0.2
 """Edge of a cell of the grid of places."""
@@ -36,6 +35,8 @@ OPEN_M: Final = 3.0
 """The grid reaches so far beyond the surfaces of a room without walls."""
 CELLS_PER_QUANTUM: Final = 4
 """Cells of the table that one quantum computes."""
+BLOCK: Final = 16
+"""Cells of a block's side: a quantum of a search compares one block at one heading."""
 GRID_READINGS_MAX: Final = 108
 """Readings that are compared."""
 SIGMA_M: Final = 0.12
@@ -58,6 +59,8 @@ START_LOG: Final = 40.0
 """A start less likely than the best one by more than this, nat, is not the place."""
 COMPLETE_LOG: Final = 20.0
 """Where the worst of so many starts is less likely than the best by this, nat, the place is among them."""
+NO_CELL: Final = -1
+"""In place of the number of a search's quantum where none runs."""
 
 Bytes = NDArray[np.uint8]
 
@@ -226,7 +229,7 @@ class PoseGrid:
         _searches=COUNT,
         _profiles=Bound(1, PROFILES_MAX),
         _shares=SHARE,
-        _quantum=Bound(NO_INDEX, COUNT.high),
+        _quantum=Bound(NO_CELL, COUNT.high),
     )
 
     def __init__(self, room: Room, surroundings: Surroundings, clear_m: float) -> None:
@@ -251,7 +254,7 @@ class PoseGrid:
         self._count = self._searches = 0
         self._profiles = 1
         self._shares = np.zeros((PROFILES_MAX, 3))
-        self._quantum = NO_INDEX
+        self._quantum = NO_CELL
         self._likely = np.zeros((PROFILES_MAX, GRID_READINGS_MAX, 3, SILENT_CODE + 1))
         self._likely_search = 0
         """Number of the search that the likelihoods are of."""
@@ -259,7 +262,7 @@ class PoseGrid:
     @property
     def is_searching(self) -> bool:
         """Whether a search has work left."""
-        return self._quantum != NO_INDEX
+        return self._quantum != NO_CELL
 
     def begin(self, readings: Floats, profiles: Floats) -> None:
         """Begin a search.
@@ -282,7 +285,7 @@ class PoseGrid:
 
     def cancel(self) -> None:
         """End a search without an answer."""
-        self._quantum = NO_INDEX
+        self._quantum = NO_CELL
 
     def refine(self) -> None:
         """Do one quantum of a search: part of the table if it is not complete, otherwise a block at one heading."""
@@ -308,7 +311,7 @@ class PoseGrid:
         offer_peaks(self.starts, self._scratch, x, y, direction * GRID_STEP_RAD, profile)
         self._quantum += 1
         if self._quantum >= self._profiles * GRID_DIRECTIONS * blocks_i * blocks_j:
-            self._quantum = NO_INDEX
+            self._quantum = NO_CELL
 
     def best_starts(self, most: int) -> Floats:
         """Return the poses that fit best, the best first, without those that fit much worse.

@@ -17,12 +17,13 @@ from perception.bounds import Finite, Place, Share, up_to
 from perception.kernel import Floats, Ints, kernel
 from perception.localization.known_room.surroundings import insert_nearest
 from perception.records import Record, Records
-from perception.shared_numbers import ODOMETER_SIGMA
 
 HEADINGS: Final = 25
 """Particles of a hypothesis."""
 HYPOTHESES_MAX: Final = 100
 """Hypotheses of the place at a time: the best starts of a search."""
+SCALE_SIGMA: Final = 0.03
+"""Standard deviation of the odometer's scale at the start."""
 PLACE_WALK: Final = 0.02**2
 """Variance of a displacement by odometry on each axis, m²/m."""
 SCALE_WALK: Final = 0.002**2
@@ -34,9 +35,8 @@ TURN_SHARE: Final = 0.02
 """Standard deviation of a turn by odometry as a share of it."""
 TURN_WALK: Final = 0.0005
 """Variance of a turn by odometry beyond that, rad²/rad: an error of scale adds up over many turns to one side."""
-TEMPER: Final = 0.5
-"""Weight of a reading, in the likelihood and in the fit of the place, and of log evidence between hypotheses: errors
-of the map are common to readings of one wall, and what places that look alike differ by to many readings."""
+SHARE_TEMPER: Final = 0.5
+"""Weight of log evidence between hypotheses: places that look alike differ by what is common to many readings."""
 RESAMPLE_SHARE: Final = 0.5
 """Particles are resampled where fewer than this share of them carry the weight."""
 MERGE_M: Final = 0.3
@@ -154,7 +154,7 @@ def add_hypothesis(
         p.heading = heading + heading_half_rad * (2.0 * i / (HEADINGS - 1) - 1.0)
         p.x, p.y, p.scale = x, y, 1.0
         p.xx, p.xy, p.xs = place_sigma_m * place_sigma_m, 0.0, 0.0
-        p.yy, p.ys, p.ss = place_sigma_m * place_sigma_m, 0.0, ODOMETER_SIGMA * ODOMETER_SIGMA
+        p.yy, p.ys, p.ss = place_sigma_m * place_sigma_m, 0.0, SCALE_SIGMA * SCALE_SIGMA
         p.log_weight, p.log_ratio = -math.log(HEADINGS), 0.0
         p.specular = p.turned_away = p.late = p.wild = p.beside = p.could_beside = 0.0
     of[0].count = count + 1
@@ -343,7 +343,7 @@ def conclude(of: HypothesesRecord, least_log: float, most: int, scratch: Records
     middle = of[0].hypotheses[h]
     for k in range(of[0].count):
         other = of[0].hypotheses[k]
-        odds = math.exp(TEMPER * (other.log_evidence - middle.log_evidence))
+        odds = math.exp(SHARE_TEMPER * (other.log_evidence - middle.log_evidence))
         turn = (other.heading - middle.heading + math.pi) % (2.0 * math.pi) - math.pi
         total += odds
         if math.hypot(other.x - middle.x, other.y - middle.y) <= SAME_PLACE_M and abs(turn) <= SAME_PLACE_RAD:

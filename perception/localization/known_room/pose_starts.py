@@ -7,13 +7,17 @@ from typing import Annotated, Final
 
 from perception.bounds import FINITE, Finite, Place, index_of, up_to
 from perception.kernel import kernel
-from perception.localization.known_room.pose_particles import MERGE_M, MERGE_RAD
 from perception.records import Record, Records
 
 STARTS_MAX: Final = 200
 """Starts that a search keeps, the best ones."""
 PROFILES_MAX: Final = 2
 """Guesses of the causes of readings that a search tries."""
+START_APART_M: Final = 0.3
+"""Starts nearer to each other than this on each axis, in heading than `START_APART_RAD`, are one: one and a half
+steps of the search."""
+START_APART_RAD: Final = math.radians(9.0)
+"""Difference of headings in `START_APART_M`."""
 
 
 class Start(Record):
@@ -53,7 +57,7 @@ def offer(to: Records[Starts], x: float, y: float, heading: float, score: float,
     for k in range(to[0].count):
         other = starts[k]
         turn = abs((heading - other.heading + math.pi) % (2.0 * math.pi) - math.pi)
-        if abs(x - other.x) < MERGE_M and abs(y - other.y) < MERGE_M and turn < MERGE_RAD:
+        if abs(x - other.x) < START_APART_M and abs(y - other.y) < START_APART_M and turn < START_APART_RAD:
             if score > other.score:
                 other.x, other.y, other.heading, other.score, other.profile = x, y, heading, score, profile
             return

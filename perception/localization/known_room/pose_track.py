@@ -13,13 +13,13 @@ from perception.kernel import Floats
 from perception.localization.known_room.background import Background
 from perception.localization.known_room.keyframes import KEYFRAMES_MAX, Keyframes
 from perception.localization.known_room.mixed_reflection import LearnedShares
-from perception.localization.known_room.particle_update import update_particles
+from perception.localization.known_room.particle_update import TEMPER, update_particles
 from perception.localization.known_room.pose_particles import (
     HEADINGS,
     HYPOTHESES_MAX,
     SAME_PLACE_M,
     SAME_PLACE_RAD,
-    TEMPER,
+    SHARE_TEMPER,
     Best,
     Hypotheses,
     ParticleScratch,
@@ -243,7 +243,7 @@ class PoseTrack:
         rows, best = self._memory["hypotheses"][0][: len(self)], self.best
         turns = np.abs((rows["heading"] - best.heading + math.pi) % (2.0 * math.pi) - math.pi)
         away = (np.hypot(rows["x"] - best.x, rows["y"] - best.y) > SAME_PLACE_M) | (turns > SAME_PLACE_RAD)
-        odds = TEMPER * (rows["log_evidence"] - rows["log_evidence"].max(initial=-math.inf))
+        odds = SHARE_TEMPER * (rows["log_evidence"] - rows["log_evidence"].max(initial=-math.inf))
         return int((away & (odds > math.log(RIVAL_SHARE))).sum())
 
     def pose(self, odometry: Pose) -> Pose:

@@ -13,9 +13,6 @@ from perception.kernel import Floats
 
 HEARD_PRIOR: Final = 0.5
 """Share of the sensors that hear something, at a place of which nothing is known."""
-OUTLIERS: Final = 0.1
-"""Share of the readings that are of something else than the map, and of its pairs of walls that are not of one
-wall."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ before or after. Within a few metres of way with turns, echoes agree on one map 
 from which it was heard: the likelihood of the readings in their own map is compared for several lags, and summed over
 all such windows of the way. It is estimated in quanta, until it is known well; then this costs nothing any more.
 
-The ring's lag is right until refuted: another one is used once it is likelier by three standard deviations.
+The ring's lag is right until refuted: another one is used once it is likelier by `LAG_REFUTED`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,6 @@ from perception.localization.submaps.submap_records import (
     fresh_sensors,
 )
 from perception.sensor_mounts import mounts_array, mounts_at
-from perception.shared_numbers import OUTLIER_SIGMAS
 
 LAG_STEP_S: Final = 0.06
 """Time between two lags that are compared."""
@@ -41,6 +40,9 @@ LAGS: Final = LAG_STEP_S * np.arange(-6, 7)
 """Lags that are compared, beside the ring's. Between them the likelihood of real drives is a parabola."""
 LAG_SIGMA_S: Final = 0.015
 """The lag is known well enough with this standard deviation: at 1 m/s it moves an echo by 1.5 cm."""
+LAG_REFUTED: Final = 4.5
+"""Log likelihood by which another lag than the ring's must be likelier: three standard deviations. Real drives
+without a lag gain up to 0.5."""
 LAG_READINGS_MIN: Final = 20
 """Readings of a window that say anything of the lag."""
 TRAIL_MAX: Final = 1024
@@ -66,7 +68,7 @@ class FoundLag(NamedTuple):
     @property
     def is_refuted(self) -> bool:
         """Whether the ring's own lag is too unlikely to be used."""
-        return self.gain > 0.5 * OUTLIER_SIGMAS**2
+        return self.gain > LAG_REFUTED
 
     def __str__(self) -> str:
         which = "the ranges lag behind odometry" if self.lag_s > 0.0 else "odometry lags behind the ranges"

@@ -14,7 +14,6 @@ import numpy as np
 
 from perception.angles import wrapped
 from perception.kernel import Floats, kernel
-from perception.localization.room.range_likelihood import OUTLIERS
 
 BENDS: Final = 3.0
 """Deviations of a wall, from one end to the other, that are independent of each other. With so many, pairs of lines
@@ -25,6 +24,8 @@ PAIR_M: Final = 0.4
 """Lines that lie farther apart are not of one wall, m."""
 SHARED_M: Final = 0.8
 """Length that two lines of one wall have in common, m: a third to half of those with less are of two walls."""
+FALSE_PAIRS: Final = 0.1
+"""Share of pairs that are not of one wall."""
 POSE_ROUNDS: Final = 4
 """Steps to the pose that fits best."""
 
@@ -87,7 +88,7 @@ def find_pairs(
     """
     for k in range(len(lines)):
         pairs[k, 0] = pairs[k, 1] = 0.0
-        best = OUTLIERS / (4.0 * PAIR_RAD * PAIR_M)
+        best = FALSE_PAIRS / (4.0 * PAIR_RAD * PAIR_M)
         for n in range(len(before)):
             if not compare(lines[k], before[n], pose, difference):
                 continue
@@ -98,10 +99,10 @@ def find_pairs(
             d = off_variance + place + theta * (both + b)
             determinant = a * d - b * b
             chi = (d * turn * turn - 2.0 * b * turn * off + a * off * off) / determinant
-            density = (1.0 - OUTLIERS) * math.exp(-0.5 * chi) / (2.0 * math.pi * math.sqrt(determinant))
+            density = (1.0 - FALSE_PAIRS) * math.exp(-0.5 * chi) / (2.0 * math.pi * math.sqrt(determinant))
             if density > best:
                 best, pairs[k, 0] = density, n
-                pairs[k, 1] = density / (density + OUTLIERS / (4.0 * PAIR_RAD * PAIR_M))
+                pairs[k, 1] = density / (density + FALSE_PAIRS / (4.0 * PAIR_RAD * PAIR_M))
 
 
 @kernel

@@ -31,7 +31,6 @@ from perception.localization.submaps.pose_graph import (
 )
 from perception.localization.submaps.submap_records import between, match_link, pose_of, spread_about, unlost
 from perception.records import Structured, records, zeros
-from perception.shared_numbers import OUTLIER_SIGMAS
 
 OVERLAP_M: Final = 6.0
 """Maps nearer to each other than this may overlap."""
@@ -48,6 +47,8 @@ KNOWN_MIN: Final = 20.0
 """Known readings that a match needs."""
 MISFIT_MAX: Final = 0.5
 """By how much a reading of a match may be less likely than is usual, nat."""
+MATCH_GATE: Final = 27.0
+"""Squared deviation of a match from what was expected, over its covariance."""
 SEARCH_REACH_M: Final = (0.3, 1.2)
 """Least and greatest distance from what is expected at which a match is looked for."""
 SEARCH_REACH_RAD: Final = (0.1, 0.3)
@@ -148,7 +149,7 @@ def match_map(maps: Maps, half_angle: float) -> Iterator[Outcome | None]:
         own = np.diag([MATCH_M**2, MATCH_M**2, MATCH_RAD**2])
         chi = off @ np.linalg.inv(np.linalg.inv(match.information) + own + np.diag([place, place, turn])) @ off
         misfit = usual[0] / usual[1] - log_likelihood / max(match.known, 1.0)
-        if match.known < KNOWN_MIN or misfit > MISFIT_MAX or chi > 3.0 * OUTLIER_SIGMAS**2:
+        if match.known < KNOWN_MIN or misfit > MISFIT_MAX or chi > MATCH_GATE:
             continue
         information = np.linalg.inv(np.linalg.inv(_firm(match.information)) + own)
         if is_next:  # loops find walls from both sides, and as they were bent by the drift between

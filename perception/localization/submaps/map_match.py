@@ -14,16 +14,21 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from perception.kernel import Floats, kernel
-from perception.localization.room.range_likelihood import OUTLIERS
-from perception.localization.submaps.line_pairs import POSE_ROUNDS
-from perception.localization.submaps.local_grid import ECHO_MAX_M, HALF_CELLS, SUBMAP_CELL_M, SUBMAP_CELLS
-from perception.shared_numbers import SILENCE_M
+from perception.localization.submaps.local_grid import (
+    ECHO_MAX_M,
+    HALF_CELLS,
+    SILENT_CLEAR_M,
+    SUBMAP_CELL_M,
+    SUBMAP_CELLS,
+)
 
 MATCH_RAYS: Final = 7
 """Rays of a beam along which the map is asked."""
 ANSWERS: Final = 0.2
 """Share of a cell's probability with which one ray is answered. With more, beams end before the surface: drives with
 known poses were matched 5 cm short with 0.6, without a bias with 0.2, where their readings also are likeliest."""
+MATCH_OUTLIERS: Final = 0.1
+"""Share of the readings that come from nothing in the map."""
 MATCH_NOISE_M: Final = 0.08
 """Noise of a range in cells of 0.1 m."""
 BEAM_CELLS: Final = 50
@@ -35,6 +40,8 @@ MATCH_TEMPER: Final = 0.1
 real drives deviate as they say (the median of their squared errors over their covariance is 1 to 2 for 3 degrees)."""
 POSE_STEP: Final = np.array([0.08, 0.08, 0.03])
 """Differences of place (m) and direction (rad) by which the likelihood's slope and curvature are taken."""
+STEP_MOVE_MAX_M: Final = 0.15
+"""The most by which one step shifts a match."""
 STEP_TURN_MAX_RAD: Final = 0.06
 """The most by which one step turns a match."""
 INFORMATION_MIN: Final = 1.0
@@ -49,6 +56,8 @@ SEARCH_READINGS: Final = 80
 """Readings of a search."""
 FIT_READINGS: Final = 250
 """Readings of the match that follows a search."""
+NEWTON_STEPS: Final = 4
+"""Newton steps of that match."""
 _AXES: Final = np.eye(3)
 
 
@@ -92,7 +101,7 @@ def fit_of(
         axis = at[2] + readings[k, 2]
         is_silent = range_m > ECHO_MAX_M
         last = BEAM_CELLS if is_silent else min(BEAM_CELLS, int(range_m / SUBMAP_CELL_M) + 3)
-        end = int((SILENCE_M if is_silent else range_m) / SUBMAP_CELL_M)
+        end = int((SILENT_CLEAR_M if is_silent else range_m) / SUBMAP_CELL_M)
         known = 0.0
         for n in range(last):
             goes_on[n] = 1.0
@@ -119,11 +128,11 @@ def fit_of(
                 density += passes * (1.0 - goes_on[n]) * math.exp(-0.5 * (off / MATCH_NOISE_M) ** 2)
             passes *= goes_on[n]
         if is_silent:
-            likelihood = (1.0 - OUTLIERS) * passes + 0.5 * OUTLIERS
+            likelihood = (1.0 - MATCH_OUTLIERS) * passes + 0.5 * MATCH_OUTLIERS
         else:
-            likelihood = (1.0 - OUTLIERS) * density / (
+            likelihood = (1.0 - MATCH_OUTLIERS) * density / (
                 MATCH_NOISE_M * math.sqrt(2.0 * math.pi)
-            ) + OUTLIERS / ECHO_MAX_M
+            ) + MATCH_OUTLIERS / ECHO_MAX_M
         total += known * (math.log(likelihood) - usual)
         weight += known
     fit[0], fit[1] = step * total, step * weight
@@ -221,7 +230,7 @@ def best_match(
         return MATCH_TEMPER * float(fit[0])
 
     at = best[:3].copy()
-    for _ in range(POSE_ROUNDS):
+    for _ in range(NEWTON_STEPS):
         here, slope = log_density(at), np.zeros(3)
         plus, minus, curvature = np.zeros(3), np.zeros(3), np.zeros((3, 3))
         for i in range(3):
@@ -240,7 +249,7 @@ def best_match(
         move = axes @ ((axes.T @ slope) / values)
         share = min(
             1.0,
-            SEARCH_STEP_M / max(1e-9, math.hypot(move[0], move[1])),
+            STEP_MOVE_MAX_M / max(1e-9, math.hypot(move[0], move[1])),
             STEP_TURN_MAX_RAD / max(1e-9, abs(move[2])),
         )
         at = at + share * move

@@ -29,6 +29,8 @@ from perception.mapping.grid.window import (
 )
 from perception.sensor_mounts import SensorPose
 
+BEAM_SIGMAS: Final = 2.0
+"""The beam's half width in σ_θ."""
 ARC_SIGMAS: Final = 2.0
 """Half the thickness of an echo's arc, in σ_r."""
 PEAK: Final = 0.49
@@ -85,7 +87,7 @@ def enter_reading(
             for ix in range(low_x, high_x + 1):
                 dx = (ix + 0.5) * cell_m - sx
                 theta = math.atan2(ux * dy - uy * dx, ux * dx + uy * dy)
-                across = math.exp(-0.5 * (ARC_SIGMAS * theta / half_angle) ** 2)
+                across = math.exp(-0.5 * (BEAM_SIGMAS * theta / half_angle) ** 2)
                 d = math.hypot(dx, dy)
                 value = log_odds[iy & mask, ix & mask]
                 p = 0.5

@@ -16,20 +16,13 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.bounds import SHARE, bounds
 from perception.kernel import Floats, kernel
-from perception.mapping.grid.window import (
-    SPREAD_RELATIVE,
-    Raster,
-    Ring,
-    Window,
-    columns_of_beam,
-    placed,
-    rows_within,
-    set_edges,
-)
+from perception.mapping.grid.window import Raster, Ring, Window, columns_of_beam, placed, rows_within, set_edges
 from perception.sensor_mounts import SensorPose
 
 EMPTY, OCCUPIED = range(2)
 """The two values of a cell."""
+ACCURACY: Final = 0.01
+"""ε: error of a range as a share of it."""
 ACCURACY_CELLS: Final = 0.65
 """Least error of a range in cells: with less, an arc would miss all their centres."""
 NEAREST_M: Final = 0.15
@@ -136,7 +129,7 @@ class MoravecElfesGrid:
         for (sx, sy, axis), r in zip(placed(firing, self._ring), firing.ranges_m.tolist(), strict=True):
             if math.isnan(r) or (r == math.inf and silence_m == 0.0):
                 continue
-            accuracy_m = max(ACCURACY_CELLS * cell_m, SPREAD_RELATIVE * r) if r < math.inf else 0.0
+            accuracy_m = max(ACCURACY_CELLS * cell_m, ACCURACY * r) if r < math.inf else 0.0
             enter_reading(
                 self.cells,
                 self.window.raster,

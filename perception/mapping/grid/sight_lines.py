@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.bounds import Bound, bounds
 from perception.kernel import Floats, Ints, kernel
-from perception.mapping.grid.cell_evidence import PLACE_NUMBERS
+from perception.mapping.grid.cell_evidence import BEYOND_M, PLACE_NUMBERS
 from perception.mapping.grid.window import (
     SPREAD_CELLS,
     SPREAD_RELATIVE,
@@ -41,7 +41,6 @@ from perception.mapping.grid.window import (
     set_edges,
 )
 from perception.sensor_mounts import SensorPose
-from perception.shared_numbers import PASSED_M
 
 LOCATED_RAD: Final = 0.07
 """Greatest angle off the line on which an echo from something recognised came, rad. In three random rooms with
@@ -55,6 +54,8 @@ cells it takes .7 points from what is called free."""
 PLACES_MIN: Final = 6
 """Where slanting walls answer, a cell was crossed if echoes passed it from so many places. Twice as many change what
 is out of reach by less than 0.2 %."""
+MIRRORS_MIN: Final = 0.5
+"""From so far a place of mirrors on, such echoes count for nothing: 20 % would be out of reach."""
 COUNT_MAX: Final = 1000
 """More places are not counted."""
 RAYS: Final = 16
@@ -64,10 +65,10 @@ MIDDLE_SHARE: Final = 0.6
 OVER_MAX: Final = 0.5
 """From this share of echoes over what holds something on, the lines count for nothing. The share is .30 in a real
 drive where everything echoes, .35 and .38 in real ones among mirrors, and .57 to .73 in generated rooms of mirrors in
-which a third of the silent readings come late: there one in five of the cells that the lines add is out of reach. The
-same for the share of recognised echoes, which is .02, .04 and .06 in these drives, and .42 and .48 in two rooms of
-mirrors without late readings: there 5 and 30 % of such cells are out of reach. From so far a place of mirrors on,
-echoes that passed a cell do not show it to be crossed: 20 % would be out of reach."""
+which a third of the silent readings come late: there one in five of the cells that the lines add is out of reach."""
+EXPLAINED_MAX: Final = 0.5
+"""From this share of recognised echoes on likewise. It is .02, .04 and .06 in these drives, and .42 and
+.48 in two rooms of mirrors without late readings: there 5 and 30 % of such cells are out of reach."""
 OVER_PRIOR: Final = 10.0
 """Echoes that are assumed to have passed over something, before any was heard."""
 ECHOES_COUNTED_MAX: Final = 40000.0
@@ -153,7 +154,7 @@ def follow_rays(
     for ray in range(RAYS):
         beside = ((bits << 1) >> ray) & 7  # the line and both beside it
         shares[ray] = ((beside & 1) + (beside >> 1 & 1) + (beside >> 2)) / max(1, answers)
-    return -1 if nearest < r - PASSED_M else 1 if in_middle else 0
+    return -1 if nearest < r - BEYOND_M else 1 if in_middle else 0
 
 
 @kernel
@@ -319,7 +320,7 @@ class SightLines:
         came, over, others, explained = self._echoes.tolist()
         over_share = (over + OVER_PRIOR) / (came + over + OVER_PRIOR)
         explained_share = explained / max(1.0, others + explained)
-        return max(0.0, 1.0 - over_share / OVER_MAX) * max(0.0, 1.0 - explained_share / OVER_MAX)
+        return max(0.0, 1.0 - over_share / OVER_MAX) * max(0.0, 1.0 - explained_share / EXPLAINED_MAX)
 
     def crossed(self, mirrors: float, trust: float | None = None) -> Flags:
         """Return which cells a line of sight has crossed: (n, n), row by row from the smallest y.
@@ -332,7 +333,7 @@ class SightLines:
             In place of what is learnt from these lines.
         """
         trust = self.trust if trust is None else trust
-        least = PLACES_MIN if mirrors < OVER_MAX else COUNT_MAX + 1
+        least = PLACES_MIN if mirrors < MIRRORS_MIN else COUNT_MAX + 1
         units = UNITS_PER_LINE * LINES_MIN / trust if trust > 0.0 else math.inf
         out = np.empty(self.sights.shape[:2], np.bool_)
         fill_crossed(self.sights, self._window.corner, least, units, out)

@@ -17,7 +17,6 @@ from drivers.messages import Firing, Pose
 from perception.bounds import CONSTANT, Bound, bounds
 from perception.kernel import Floats, Ints, kernel
 from perception.sensor_mounts import RingPose, mounts_at, ring_pose
-from perception.shared_numbers import FAR
 
 Cell = TypeVar("Cell", bound=np.generic)
 
@@ -31,6 +30,8 @@ SPREAD_RELATIVE: Final = 0.01
 """Least standard deviation of an echo's range, as a share of it."""
 CENTRED_CELLS: Final = 4
 """The window follows once the robot is so many cells from its middle."""
+DRIVEN_MAX_M: Final = 1e6
+"""No robot drives so far; a pose beyond it is a fault."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,7 +173,7 @@ def set_edges(bearing: float, half_angle: float, edges: Floats) -> None:
 
 def is_possible(pose: Pose) -> bool:
     """Return whether a robot can have a pose."""
-    return abs(pose.x) < FAR and abs(pose.y) < FAR and math.isfinite(pose.theta)
+    return abs(pose.x) < DRIVEN_MAX_M and abs(pose.y) < DRIVEN_MAX_M and math.isfinite(pose.theta)
 
 
 def beams_of(firing: Firing, ring: Ring, bearings: Floats) -> Beams:
@@ -192,7 +193,7 @@ def placed(firing: Firing, ring: Ring) -> list[list[float]]:
 
 def _corner_bound(window: Window) -> Bound:
     """Return the bound of the number of the window's first cell."""
-    most = math.ceil(FAR / window.cell_m) + window.cells
+    most = math.ceil(DRIVEN_MAX_M / window.cell_m) + window.cells
     return Bound(-most, most)
 
 

@@ -15,7 +15,7 @@ from perception.bounds import bounds
 from perception.kernel import Floats, Ints
 from perception.map_moves import MapMoves
 from perception.mapping.surfaces.cells import make_again
-from perception.mapping.surfaces.parameters import CELL_M, CELLS, REACH_M, READINGS_MAX, REVISITS
+from perception.mapping.surfaces.parameters import CELL_M, CELLS, LAST_REVISITS, REACH_M, READINGS_KEPT
 from perception.mapping.surfaces.piece_fit import group_echoes
 from perception.mapping.surfaces.pieces import order_cells
 from perception.mapping.surfaces.quantum import (
@@ -99,7 +99,7 @@ class LocalMapSearch:
         dx, dy = float(room["centre_x"]) - x, float(room["centre_y"]) - y
         readings = room["readings"][:count]
         kept = np.flatnonzero((np.abs(readings["x"] + dx) < half) & (np.abs(readings["y"] + dy) < half))
-        kept = kept[-(READINGS_MAX // 2) :]
+        kept = kept[-READINGS_KEPT:]
         readings[: len(kept)] = readings[kept]
         readings[len(kept) :].view(np.uint8)[...] = 0
         readings["x"][: len(kept)] += dx
@@ -124,7 +124,7 @@ class LocalMapSearch:
         room["carried"] = max(room["carried"], room["entered"])
         for name in ("entered", "revisited", "swept"):
             room[name] = 0
-        room["owed"] = max(room["owed"], REVISITS * room["carried"])
+        room["owed"] = max(room["owed"], LAST_REVISITS * room["carried"])
         room["phase"] = CLEAR
 
     def submaps(self, x: Floats, y: Floats) -> Ints:

@@ -32,13 +32,26 @@ SHARE_BITS: Final = 7
 """Bits of each share in such a number."""
 WHOLE_PASS: Final = 16
 """A pass along the beam's axis; at the beam's edge it counts half."""
+NEARER_M: Final = 0.1
+"""A range passed through what is nearer by this. Drives: 0.06 and 0.15 lose 1 to 2 % at the same false share."""
+SILENCE_M: Final = 2.5
+"""Way for which silence counts as a pass."""
 PRIOR_READINGS: Final = 1.0
 """Readings of one direction for which the other directions of a cell stand. Drives: 0.1 to 1 within 1 %."""
+OUTLIER: Final = 0.005
+"""Probability of an echo from nowhere, beside those of the places on its arc."""
 REVISITS: Final = 3
-"""Times that an earlier echo is shared again for each new reading, and all before a local map is left. Drives: 2 as
-good, none 2 to 4 % more false."""
+"""Times that an earlier echo is shared again for each new reading. Drives: 2 as good, none 2 to 4 % more false."""
+LAST_REVISITS: Final = 3
+"""Times that all echoes are shared again before a local map is left."""
+SPACING_M: Final = 0.02
+"""A sensor that has moved by less than this, and turned by less than `SPACING_RAD`, says the same again."""
+SPACING_RAD: Final = 0.02
+"""Turn in `SPACING_M`."""
 READINGS_MAX: Final = 12288
 """Readings of a local map, at most."""
+READINGS_KEPT: Final = 6144
+"""Readings with which the next local map begins, at most."""
 
 STRENGTH_MIN: Final = 0.9
 """Echoes by which a cell is occupied: each direction counts one at most, and a tenth of the rest; less where few are
@@ -61,7 +74,9 @@ SURFACE_CELLS_MAX: Final = 12288
 PIECES_MAX: Final = 384
 """Straight pieces of a local map, at most."""
 OFF_LINE_M: Final = 0.06
-"""A cell belongs to a straight piece within this, and starts no other one."""
+"""A cell belongs to a straight piece within this."""
+TAKEN_M: Final = 0.06
+"""Cells within this of a piece start no other one."""
 GAP_M: Final = 0.15
 """Greatest gap in a piece; 0.2 adds false length, 0.1 loses walls between mirrors."""
 PIECE_MIN_M: Final = 0.25
@@ -73,6 +88,8 @@ COVERED_MIN: Final = 0.6
 """Least share of a piece's length with occupied cells."""
 END_STRENGTH: Final = 1.5
 """A piece ends at its outermost cell of this strength. Drives: false length 4.0 to 1.7 % in the office."""
+NODE_CELLS: Final = 2
+"""Cells around a point of a polyline whose echoes it is given: up to 0.1 m away."""
 NODE_STRENGTH: Final = 2.5
 """It has two whole echoes from each of two directions, or as much, and a little more. Drives: with 2.4 polylines
 explain 0.2 % more and 1.2 instead of 0.8 % of them are false, in other buildings 8.1 instead of 7.3 %; with 2.2
@@ -81,13 +98,13 @@ POINT_ECHO_NAT: Final = 1.5
 """Log odds of a point of a polyline by an echo; a pass has those of a surface like the map's pieces. Other buildings
 where everything echoes: 6.9 to 3.1 % of the polylines are false, and as much is explained; 1.0 leaves 2.1 %, but
 explains 0.4 % less of the drives, 1.25 0.1 % less."""
+NODE_M: Final = 0.1
+"""Least distance between the points of a polyline."""
+LINK_M: Final = 0.2
+"""Greatest distance between the points of a polyline: twice as much, as there may be no cell for a point between
+them."""
 AGREES_M: Final = 0.1
-"""Two surfaces within this are one: the distance within which a surface explains an echo. Points of a polyline are at
-least this far apart and at most twice this, as there may be no cell for a point between them; a range passed through
-what is nearer by this (drives: 0.06 and 0.15 lose 1 to 2 % at the same false share)."""
-APART: Final = round(AGREES_M / CELL_M)
-"""Cells between two points of a polyline, at least; at most twice as many. A point is given the echoes of the cells
-this near to it."""
+"""Two surfaces within this are one: the distance within which a surface explains an echo."""
 KNOWN_NAT: Final = 40.0
 """Log odds against a piece as a wall where all that was heard lies along what the method knows, before the piece's
 own evidence."""

@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from perception.kernel import kernel
-from perception.mapping.surfaces.cells import direction_strength, hits_around, passes_of_heard
+from perception.mapping.surfaces.cells import LEAST_READINGS, direction_strength, hits_around, passes_of_heard
 from perception.mapping.surfaces.parameters import (
-    APART,
     CELL_M,
     CELLS,
     DIRECTIONS,
+    LINK_M,
+    NODE_CELLS,
+    NODE_M,
     NODE_STRENGTH,
     PIECE_KEPT_M,
     POINT_ECHO_NAT,
 )
 from perception.mapping.surfaces.pieces import offset_of
 from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCounts, LocalMap, SurfaceCell
-from perception.shared_numbers import LEAST_READINGS
+
+APART: Final = round(NODE_M / CELL_M)
+LINKED: Final = round(LINK_M / CELL_M)
+"""Cells between two points of a polyline, at least and at most."""
 
 
 @kernel
 def choose_nodes(room: LocalMap, counts: CellCounts, begin: int, end: int) -> None:
-    """Make the strongest cells that are left, at least `AGREES_M` apart, points of polylines, where echoes agree.
+    """Make the strongest cells that are left, at least `NODE_M` apart, points of polylines, where echoes agree.
 
     Parameters
     ----------
@@ -87,7 +93,7 @@ def is_agreed(counts: CellCounts, cell: SurfaceCell, nat: float) -> bool:
     """
     strength, passes = 0.0, 0.0
     for b in range(DIRECTIONS):
-        hits = hits_around(counts, b, cell.i, cell.j, APART)
+        hits = hits_around(counts, b, cell.i, cell.j, NODE_CELLS)
         strength += direction_strength(hits)
         passes += direction_strength(passes_of_heard(counts, b, cell.i, cell.j, hits))
     return bool(strength >= NODE_STRENGTH and strength * POINT_ECHO_NAT + passes * nat > 0.0)
@@ -97,9 +103,9 @@ def is_agreed(counts: CellCounts, cell: SurfaceCell, nat: float) -> bool:
 def next_node(room: LocalMap, counts: CellCounts, of: int) -> int:
     """Return the nearest point of a polyline that is linked to a cell and not taken, −1 if there is none."""
     cell = room.cells[of]
-    best, nearest = 4 * APART * APART + 1, -1
-    for i in range(max(0, cell.i - 2 * APART), min(CELLS, cell.i + 2 * APART + 1)):
-        for j in range(max(0, cell.j - 2 * APART), min(CELLS, cell.j + 2 * APART + 1)):
+    best, nearest = LINKED * LINKED + 1, -1
+    for i in range(max(0, cell.i - LINKED), min(CELLS, cell.i + LINKED + 1)):
+        for j in range(max(0, cell.j - LINKED), min(CELLS, cell.j + LINKED + 1)):
             n = counts.index[i, j] - 1
             if n < 0 or n == of or room.cells[n].owner != NODE:
                 continue

@@ -10,14 +10,24 @@ from typing import Final
 
 from perception.kernel import Floats, kernel
 from perception.mapping.surfaces.cells import clear_cells, enter_readings, share_again
-from perception.mapping.surfaces.parameters import CELLS, LEFT_M, LEFT_MAX_M, READINGS_MAX, REVISITS
+from perception.mapping.surfaces.parameters import (
+    CELLS,
+    LAST_REVISITS,
+    LEFT_M,
+    LEFT_MAX_M,
+    READINGS_MAX,
+    REVISITS,
+    SPACING_M,
+    SPACING_RAD,
+)
 from perception.mapping.surfaces.piece_fit import group_echoes, judge, place_echoes
 from perception.mapping.surfaces.pieces import ROW_PARTS, capture, grow_all, order_cells
 from perception.mapping.surfaces.polylines import chain_all, choose_nodes
-from perception.mapping.surfaces.records import CellCounts, LocalMap
+from perception.mapping.surfaces.records import BLOCK, CellCounts, LocalMap
 from perception.records import Records
-from perception.shared_numbers import BLOCK, FAR, SPACING
 
+SILENCE: Final = 1e6
+"""Range of silence, m."""
 ENTERED: Final = 16
 """Readings that one quantum enters, in a twentieth of a millisecond, as each of those below."""
 SHARED: Final = 48
@@ -72,13 +82,13 @@ def keep(rooms: Records[LocalMap], mounts: Floats, pose: Floats, ranges: Floats,
         if room.is_kept[k] == 1:
             moved = math.hypot(x - room.kept_x[k], y - room.kept_y[k])
             turned = axis - room.kept_axis[k]
-            if moved < SPACING and 2.0 * abs(math.sin(0.5 * turned)) < SPACING:
+            if moved < SPACING_M and 2.0 * abs(math.sin(0.5 * turned)) < SPACING_RAD:
                 continue
         room.is_kept[k] = 1
         room.kept_x[k], room.kept_y[k], room.kept_axis[k] = x, y, axis
         q = room.readings[room.count]
         q.x, q.y, q.axis = x - room.centre_x, y - room.centre_y, axis
-        q.range_m = ranges[k] if ranges[k] < range_max else FAR
+        q.range_m = ranges[k] if ranges[k] < range_max else SILENCE
         q.submap = room.submap
         room.count += 1
 
@@ -104,7 +114,7 @@ def leave(rooms: Records[LocalMap]) -> None:
     room = rooms[0]
     if room.is_left == 0:
         room.is_left = 1
-        room.owed += REVISITS * room.count
+        room.owed += LAST_REVISITS * room.count
 
 
 @kernel

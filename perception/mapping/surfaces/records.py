@@ -25,7 +25,6 @@ from perception.mapping.surfaces.parameters import (
     SURFACE_CELLS_MAX,
 )
 from perception.records import Record, Records
-from perception.shared_numbers import BLOCK
 
 WORDS: Final = SAMPLES // SHARES_A_WORD
 PACKED_SHARES: Final = Bound(0, 2 ** (SHARES_A_WORD * SHARE_BITS) - 1)
@@ -34,6 +33,8 @@ Narrow = NDArray[np.int32]
 """Counts of all readings fit, and twice as many of them fit into the processor's caches."""
 RIM: Final = 2
 """Cells at the map's rim that are not used, so that each cell has neighbours."""
+BLOCK: Final = 16
+"""Cells along the edge of a block: where nothing was heard, none of its cells is looked at."""
 CHAIN_MAX: Final = 64
 """Points of one polyline, at most."""
 NODES_MAX: Final = 4096

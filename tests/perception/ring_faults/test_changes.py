@@ -13,14 +13,14 @@ from perception.ring_faults.changes import (
     EXCHANGED,
     LENGTHENED,
     NO_CHANGE,
+    ROUND_M,
     Expected,
     density,
     expect,
     source,
     weigh_changes,
-)
-from perception.ring_faults.memory import LEADS_M, EchoTrace, mark
-from perception.shared_numbers import NO_RANGE
+)  # fmt: skip
+from perception.ring_faults.memory import NO_ECHO_M, EchoTrace, mark
 
 COUNT = 16
 AXES = np.arange(COUNT) * math.tau / COUNT
@@ -35,7 +35,7 @@ def looks(before: Floats, latest: Floats, moved_m: float = 0.1, turned_rad: floa
     """Return the memory of a ring that moved ahead and turned between two looks; infinite ranges are silences."""
     echoes = records(EchoTrace, zeros(EchoTrace, COUNT))
     for k in range(COUNT):
-        then, now = (r[k] if math.isfinite(r[k]) else NO_RANGE for r in (before, latest))
+        then, now = (r[k] if math.isfinite(r[k]) else NO_ECHO_M for r in (before, latest))
         echoes[k].is_compared = 1
         mark(echoes[k].before, then, 0.0, 0.0, AXES[k], 0.0)
         mark(echoes[k].latest, now, moved_m, 0.0, AXES[k] + turned_rad, moved_m)
@@ -133,7 +133,7 @@ def test_a_robot_that_turns_fast_among_mirrors_hears_other_surfaces_at_once() ->
 
 
 def test_what_was_heard_too_long_ago_or_not_twice_says_nothing() -> None:
-    far = looks(ROOM, ROOM + 1.0, LEADS_M + 0.01)
+    far = looks(ROOM, ROOM + 1.0, ROUND_M + 0.01)
     assert weighed(far) == (NO_CHANGE, 0.0)
     once = looks(ROOM, ROOM + 1.0)
     for k in range(COUNT):

@@ -10,7 +10,7 @@ import pytest
 from perception.kernel import Floats
 from perception.records import records, zeros
 from perception.ring_faults.changes import EXCHANGED, LENGTHENED, Expected
-from perception.ring_faults.memory import EVIDENCE_NAT, LOOK_FIELDS, EchoTrace, RingTrace
+from perception.ring_faults.memory import EVIDENCE_NAT, EchoTrace, RingTrace
 from perception.ring_faults.motion_tests import (
     CHANGED,
     NOTHING,
@@ -21,7 +21,7 @@ from perception.ring_faults.motion_tests import (
     VANISHED,
     check_motion,
 )
-from perception.ring_faults.replays import PAST_LOOKS, PastLooks
+from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS, PastLooks
 
 COUNT = 24
 MOUNTS = np.array([[0.0, 0.0, math.tau * k / COUNT] for k in range(COUNT)])
@@ -36,7 +36,7 @@ class Ring:
         self.mounts, count = mounts, len(mounts)
         self.echoes, self.memory = zeros(EchoTrace, count), zeros(RingTrace, 1)
         self.expected = zeros(Expected, count)
-        self.past = np.zeros((count, PAST_LOOKS, LOOK_FIELDS))
+        self.past = np.zeros((count, PAST_LOOKS, PAST_FIELDS))
         self.looks, self.replayed_nat = np.zeros(count, np.int64), np.zeros(PAST_LOOKS)
         self.x = self.yaw = 0.0
         self.step_m = STEP_M

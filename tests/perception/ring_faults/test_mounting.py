@@ -12,10 +12,10 @@ from config.world import WallConfig, WorldConfig
 from drivers.messages import Firing, Pose
 from perception.kernel import Floats
 from perception.records import records
-from perception.ring_faults.memory import EVIDENCE_NAT, LEADS_M, QUARTERS, EchoTrace, RingTrace
+from perception.ring_faults.memory import EVIDENCE_NAT, QUARTERS, EchoTrace, RingTrace
 from perception.ring_faults.monitor import RingMonitor
 from perception.ring_faults.motion_tests import NOTHING, STUCK_SENSOR
-from perception.ring_faults.mounting import DOUBTED_NAT, EXCLUDED_NAT, possible_places
+from perception.ring_faults.mounting import DOUBTED_NAT, ECHO_KEPT_M, EXCLUDED_NAT, possible_places
 from perception.snapshot import put_back, snapshot_of
 from tests.perception.ring_faults.test_monitor import CLEAN, SPEED_M, firings
 from tests.perception.ring_faults.test_motion_tests import COUNT, MOUNTS, Ring, after, honest
@@ -80,7 +80,7 @@ def test_an_echo_is_where_a_turned_ring_would_have_heard_it() -> None:
         expected = [place * np.exp(1j * (0.4 + 0.5 * math.pi * k)) for k in (1, 2, 3)]
         np.testing.assert_allclose(places(ring), [[one.real, one.imag] for one in expected])
         ring.fire(np.array([math.inf]))
-    while ring.x < LEADS_M + 0.1:
+    while ring.x < ECHO_KEPT_M + 0.1:
         ring.fire(np.array([math.inf]))
     assert len(places(ring)) == 0
 

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from perception.records import Records, records, zeros
-from perception.ring_faults.memory import EVIDENCE_NAT, HUNDREDFOLD_NAT, EchoTrace, RingTrace, mark
+from perception.ring_faults.memory import EVIDENCE_NAT, NO_ECHO_M, EchoTrace, RingTrace, mark
 from perception.ring_faults.repeats import (
     EQUAL_NAT,
     EQUAL_PRIOR,
     NOISY_NAT,
+    REPEAT_NAT,
     REPEATS_MAX,
     SENSOR_NAT,
     STEP_MIN_M,
@@ -24,7 +25,6 @@ from perception.ring_faults.repeats import (
     repeats,
     weigh_repeat,
 )
-from perception.shared_numbers import NO_RANGE
 
 MOUNTS = np.array([[0.0, 0.0, math.radians(15.0 * k)] for k in range(24)])
 HALF = math.radians(12.0)
@@ -111,8 +111,8 @@ def test_a_sensor_should_change_once_for_each_width_of_its_beam_that_it_turns(
 def test_readings_with_a_little_noise_repeat_each_other() -> None:
     assert repeats(2.0, 2.004)
     assert not repeats(2.0, 2.02)
-    assert repeats(NO_RANGE, NO_RANGE)
-    assert not repeats(0.001, NO_RANGE)
+    assert repeats(NO_ECHO_M, NO_ECHO_M)
+    assert not repeats(0.001, NO_ECHO_M)
 
 
 def test_a_change_ahead_ends_the_evidence_and_one_behind_only_its_own() -> None:
@@ -128,10 +128,10 @@ def test_a_change_ahead_ends_the_evidence_and_one_behind_only_its_own() -> None:
     for x in (0.0, 0.01, 0.08):
         fire(0, 2.0, x)
         fire(12, 3.0, x)
-        fire(6, NO_RANGE, x)
-    assert ring[0].repeated_nat == pytest.approx(2.0 * HUNDREDFOLD_NAT)
+        fire(6, NO_ECHO_M, x)
+    assert ring[0].repeated_nat == pytest.approx(2.0 * REPEAT_NAT)
     fire(12, 3.1, 0.08)
-    assert ring[0].repeated_nat == pytest.approx(HUNDREDFOLD_NAT)
+    assert ring[0].repeated_nat == pytest.approx(REPEAT_NAT)
     fire(0, 1.9, 0.08)
     assert ring[0].repeated_nat == 0.0
 
@@ -154,7 +154,7 @@ def test_walls_along_the_path_do_not_explain_readings_without_noise_besides_one_
             echoes[i].agreed_m, echoes[i].agreed_path_m = r, x
             weigh_repeat(i, (r, x, 0.0, axis), 0.0, i != 12, MOUNTS, RECEPTION, echoes, ring)
     equal = -math.log(EQUAL_PRIOR)
-    assert all_of.repeated_nat == pytest.approx(is_due * REPEATS_MAX * HUNDREDFOLD_NAT)
+    assert all_of.repeated_nat == pytest.approx(is_due * REPEATS_MAX * REPEAT_NAT)
     assert repeat_evidence(all_of) == pytest.approx(all_of.repeated_nat + equal, abs=0.1)
     assert (repeat_evidence(all_of) > EVIDENCE_NAT) is is_due
 
@@ -196,7 +196,7 @@ def test_noise_is_learned_at_a_standstill_from_changes_that_noise_explains() -> 
     assert look(2.01) == pytest.approx(NOISY_NAT)
     assert look(2.01) == look(2.013, 0.0) + -EQUAL_NAT
     known = look(2.013)
-    for r, x in ((3.0, 0.0), (NO_RANGE, 0.0), (3.0, 0.0), (3.01, 0.1)):
+    for r, x in ((3.0, 0.0), (NO_ECHO_M, 0.0), (3.0, 0.0), (3.01, 0.1)):
         assert look(r, x) == pytest.approx(known), "a leap, silence and a reading after a way say nothing"
     for k in range(9):
         look(3.0 + 0.01 * (k % 2), 0.1)

@@ -8,10 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from perception.ring_faults.memory import LOOK_FIELDS
+from perception.ring_faults.memory import NO_ECHO_M
 from perception.ring_faults.motion_tests import REPLAY_NAT
-from perception.ring_faults.replays import PAST_LOOKS, PastLooks, weigh_replay
-from perception.shared_numbers import NO_RANGE
+from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS, PastLooks, weigh_replay
 
 SENSORS = 8
 HALF, TOLERANCE = math.radians(15.0), 0.005
@@ -22,9 +21,9 @@ class Ring:
     """What is remembered of a ring, and the greatest evidence so far."""
 
     def __init__(self) -> None:
-        self.past = np.zeros((SENSORS, PAST_LOOKS, LOOK_FIELDS))
+        self.past = np.zeros((SENSORS, PAST_LOOKS, PAST_FIELDS))
         self.looks, self.nats = np.zeros(SENSORS, np.int64), np.zeros(PAST_LOOKS)
-        self.before = np.full(SENSORS, NO_RANGE)
+        self.before = np.full(SENSORS, NO_ECHO_M)
         self.most = 0.0
 
     def hear(self, rounds: Iterable[np.ndarray], step_m: float = STEP_M) -> float:
@@ -53,7 +52,7 @@ def drive(rounds: int, seed: int, step: float = 0.001) -> list[np.ndarray]:
     for k in range(rounds):
         ranges = np.abs(start - STEP_M * k * np.cos(axes)) * rng.normal(1.0, 0.01, SENSORS)
         ranges = np.round(ranges / step) * step
-        found.append(np.where(rng.random(SENSORS) < 0.1, NO_RANGE, ranges))
+        found.append(np.where(rng.random(SENSORS) < 0.1, NO_ECHO_M, ranges))
     return found
 
 
@@ -77,7 +76,7 @@ def test_what_stands_still_and_what_never_changes_is_no_replay() -> None:
     old = drive(5, 1)
     assert Ring().hear(old * 4, step_m=0.0) == 0.0
     assert Ring().hear([np.full(SENSORS, 2.0)] * 40) == 0.0
-    assert Ring().hear([np.full(SENSORS, NO_RANGE)] * 40) == 0.0
+    assert Ring().hear([np.full(SENSORS, NO_ECHO_M)] * 40) == 0.0
 
 
 def test_a_stuck_sensor_says_nothing_and_a_reading_that_differs_counts_against_it() -> None:

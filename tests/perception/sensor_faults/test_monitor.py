@@ -17,9 +17,8 @@ from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import CrossPaths, Firing, Pose
 from perception.pipeline import Perception
-from perception.sensor_faults.memory import RECOVERY_READINGS
 from perception.sensor_faults.monitor import SensorMonitor
-from perception.sensor_faults.reading_tests import MISSED_FIRINGS_MAX
+from perception.sensor_faults.reading_tests import MISSED_FIRINGS_MAX, RECOVERY_READINGS
 from perception.sensor_faults.report import SensorFault
 from runtime.simulation.random_halls import random_hall
 

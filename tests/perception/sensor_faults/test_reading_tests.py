@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from perception.kernel import Floats
 from perception.records import Records, records, zeros
-from perception.sensor_faults.memory import RECOVERY_READINGS, SETS_MAX, RingMemory, RingSetup, SensorMemory
+from perception.sensor_faults.memory import SETS_MAX, TOO_NEAR_READINGS, RingMemory, RingSetup, SensorMemory
 from perception.sensor_faults.reading_tests import (
     EQUAL_READINGS_MIN,
     FAULTS_CHANGED,
@@ -19,6 +19,8 @@ from perception.sensor_faults.reading_tests import (
     MISSED_FIRINGS_MAX,
     NEIGHBOUR_CHANGES_MIN,
     PASSED_CHANGES_MIN,
+    PASSED_READINGS_MIN,
+    RECOVERY_READINGS,
     begin_run,
     check_firing,
     is_stuck,
@@ -90,10 +92,10 @@ def test_most_others_must_have_changed() -> None:
         (0.9, 0.0, EQUAL_READINGS_MIN, NEIGHBOUR_CHANGES_MIN, 0, False),  # not far enough
         (1.1, 0.0, EQUAL_READINGS_MIN - 1, NEIGHBOUR_CHANGES_MIN, 0, False),
         (1.1, 0.0, EQUAL_READINGS_MIN, NEIGHBOUR_CHANGES_MIN - 1, 0, False),
-        (0.0, 2.1, 2 * EQUAL_READINGS_MIN, 4, 4, True),  # passed by, and the neighbours' readings leapt
-        (0.0, 2.1, 2 * EQUAL_READINGS_MIN, PASSED_CHANGES_MIN - 1, 3, False),  # along a wall
-        (0.0, 2.1, 2 * EQUAL_READINGS_MIN, PASSED_CHANGES_MIN, 0, True),
-        (0.0, 1.9, 2 * EQUAL_READINGS_MIN, PASSED_CHANGES_MIN, PASSED_CHANGES_MIN, False),
+        (0.0, 2.1, PASSED_READINGS_MIN, 4, 4, True),  # passed by, and the neighbours' readings leapt
+        (0.0, 2.1, PASSED_READINGS_MIN, PASSED_CHANGES_MIN - 1, 3, False),  # along a wall
+        (0.0, 2.1, PASSED_READINGS_MIN, PASSED_CHANGES_MIN, 0, True),
+        (0.0, 1.9, PASSED_READINGS_MIN, PASSED_CHANGES_MIN, PASSED_CHANGES_MIN, False),
     ],
 )
 def test_stuck_needs_a_way_equal_readings_and_neighbours_that_change(
@@ -108,7 +110,7 @@ def test_stuck_needs_a_way_equal_readings_and_neighbours_that_change(
 
 def test_a_stuck_sensor_recovers_after_several_other_readings() -> None:
     memory = sensors()
-    run_of(memory, 2 * EQUAL_READINGS_MIN, 20, 20)
+    run_of(memory, PASSED_READINGS_MIN, 20, 20)
     update_run_faults(0, 2.0, 3.0, 0.0, 0.0, setup(EACH), memory, ring())
     assert memory[0].faults == STUCK
     for k in range(RECOVERY_READINGS):
@@ -191,11 +193,11 @@ def test_a_sensor_that_reads_what_it_cannot_is_masked_until_it_behaves() -> None
     assert check(near) & LESS_TRUSTED
     assert math.isnan(check.trusted[0])
     assert check.possible[0] == 0.09, "the robot keeps clear of what may be there"
-    for _ in range(RECOVERY_READINGS - 1):
+    for _ in range(TOO_NEAR_READINGS - 1):
         check(near)
     assert check.sensors[0].faults == TOO_NEAR
     assert math.isnan(check.possible[0])
-    for _ in range(RECOVERY_READINGS):
+    for _ in range(TOO_NEAR_READINGS):
         check(far)
     assert check.sensors[0].faults == 0
     assert check.possible[0] == 0.11

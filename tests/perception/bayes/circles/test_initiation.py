@@ -9,11 +9,11 @@ import pytest
 
 from perception.bayes.circles import initiation as track_initiation
 from perception.bayes.inference.outline_map import add_to_map
+from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import HISTORY
-from perception.bayes.memory.parameters import ESTABLISH_HITS, OUTLINE_CELL_M
+from perception.bayes.memory.parameters import NEW_LINE_HITS_MIN, OUTLINE_CELL_M
 from perception.bayes.memory.state import FREE, TENTATIVE, CircleTrack, Memory
 from perception.records import records, zeros
-from perception.shared_numbers import FAR
 from tests.perception.bayes.random_tracks import (
     RADII,
     SENSORS,
@@ -124,7 +124,7 @@ def test_a_wall_is_entered_as_a_line_and_starts_no_drum() -> None:
     track_initiation.initiate_circle(memory.s, memory.tracks, P, 0, 0.4, 1.0, 0.0, 1.0)
     assert not memory.circles["status"].any()
     line = memory.s[0].lines[0]
-    assert line.echoes >= ESTABLISH_HITS
+    assert line.echoes >= NEW_LINE_HITS_MIN
     assert (line.normal_x, line.normal_y) == pytest.approx((0.0, 1.0), abs=1e-3)
     assert line.origin_y + line.distance == pytest.approx(1.0, abs=1e-3)
 

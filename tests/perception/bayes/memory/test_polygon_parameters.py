@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from perception.bayes.memory import polygon_parameters as p
 from perception.bayes.memory.elements import POLYGON_BEARING_BINS, POLYGON_BIN_CAPACITY
-from perception.bayes.memory.parameters import SURE_HITS
 
 
 def test_twins_overlap_and_a_whole_body_needs_more_room() -> None:
@@ -22,5 +21,5 @@ def test_a_lattice_of_the_expected_width_is_not_laid_again() -> None:
 
 
 def test_a_track_with_many_hits_needs_fewer_sure_ones() -> None:
-    assert SURE_HITS < p.MANY_HITS
+    assert p.POLYGON_ESTABLISH_HITS < p.MANY_HITS
     assert p.MANY_HITS_SURE < p.POLYGON_ESTABLISH_SURE

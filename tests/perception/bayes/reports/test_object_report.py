@@ -10,8 +10,8 @@ import pytest
 
 from perception.bayes.inference import lines as walls
 from perception.bayes.inference.kernel_settings import make_settings
-from perception.bayes.memory.parameters import MAY_ANSWER_DEG, PLACED_SIGMA_M, UNKNOWN_HITS_MIN
-from perception.bayes.memory.polygon_parameters import POLYGON_INFLATION
+from perception.bayes.memory.parameters import PLACED_SIGMA_M, UNKNOWN_HITS_MIN
+from perception.bayes.memory.polygon_parameters import POLYGON_INFLATION, POLYGON_TURN_SIGMA_RAD
 from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE, CircleTrack
 from perception.bayes.reports import object_report
 from perception.bayes.tracks.archived_tracks import archived_dtype, pack
@@ -148,7 +148,7 @@ def test_a_polygon_is_reported_with_its_least_heading_and_an_uncertain_one_with_
     full = object_report.polygon_covariance(track)
     assert (full == full.T).all()
     expected = POLYGON_INFLATION * np.array([[4e-4, 1e-4, 2e-5], [1e-4, 1e-4, 1e-5], [2e-5, 1e-5, 1e-4]])
-    expected[2, 2] += math.radians(MAY_ANSWER_DEG) ** 2
+    expected[2, 2] += POLYGON_TURN_SIGMA_RAD**2
     assert full == pytest.approx(expected, rel=1e-12)
     assert object_report.polygon_object(track, box_settings, "box", 0.4).covariance is None, (
         "still where it was placed"

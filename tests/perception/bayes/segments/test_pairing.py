@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from perception.bayes.inference import noise_estimation, placement
+from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import HISTORY
-from perception.bayes.memory.parameters import HISTORY_SPACING_M
+from perception.bayes.memory.parameters import MAPPED_LENGTH_MIN_M
 from perception.bayes.memory.scratch import PairSegment
 from perception.bayes.segments import pairing
 from perception.bayes.segments.segment_list import mapped_segments
 from perception.bayes.segments.segment_pairs import tangent
 from perception.bayes.tracks import observe
 from perception.records import records, zeros
-from perception.shared_numbers import FAR
 from tests import naive_tracks
 from tests.perception.bayes.random_tracks import (
     MOUNTS,
@@ -56,7 +56,7 @@ def test_segments_equal_their_oracle(examples: int) -> None:
         actual = np.array([row[:6] for row in got.tolist()]).reshape(made, 6)
         assert actual == pytest.approx(np.array([e[:6] for e in expected]).reshape(made, 6), rel=1e-12, abs=1e-12)
         assert got["reading"].tolist() == [e[6] for e in expected]
-        long = [e for e in expected if e[4] > HISTORY_SPACING_M]
+        long = [e for e in expected if e[4] > MAPPED_LENGTH_MIN_M]
         assert memory.state["segments_numbered"][0] == numbered + len(long)
         segments += made
         assert memory.state["segments_made"][0] == segments

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from drivers.messages import Pose
+from perception.bayes.circles.outline_check import OUTLINE_READINGS_MIN
 from perception.bayes.inference import reservoir
 from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY, Reading
-from perception.bayes.memory.parameters import READINGS_MIN
 from perception.bayes.memory.state import CircleTrack, Memory, PolygonTrack
 from perception.bayes.tracks.archived_tracks import (
     ARCHIVED_READINGS,
@@ -88,11 +88,11 @@ def test_of_many_readings_bearings_all_round_keep_as_many_as_the_outline_needs()
     assert len(kept) == ARCHIVED_READINGS
     held = {one.tobytes() for one in kept}
     full = []
-    for b in np.flatnonzero(bins["count"] >= READINGS_MIN).tolist():
-        newest = [(bins["count"][b] - 1 - k) % BIN_CAPACITY for k in range(READINGS_MIN)]
+    for b in np.flatnonzero(bins["count"] >= OUTLINE_READINGS_MIN).tolist():
+        newest = [(bins["count"][b] - 1 - k) % BIN_CAPACITY for k in range(OUTLINE_READINGS_MIN)]
         if all(bins["readings"][b, k].tobytes() in held for k in newest):
             full.append(b)
-    assert len(full) == ARCHIVED_READINGS // READINGS_MIN
+    assert len(full) == ARCHIVED_READINGS // OUTLINE_READINGS_MIN
     assert max(np.diff([*full, full[0] + BEARING_BINS])) <= 4, "they lie all round"
 
 

@@ -12,7 +12,7 @@ from drivers.messages import Firing, Pose, wrap_angle
 from perception.localization.drift import drift_correction, landmark_tracker
 from perception.localization.drift.drift_correction import (
     FAILURES_MAX,
-    FIRST_WAY_M,
+    LONGEST_WAY_M,
     WAITING_MAX,
     DriftCorrection,
     SeenObject,
@@ -164,7 +164,7 @@ def test_without_any_landmark_the_filter_follows_odometry_after_a_while() -> Non
     silent = np.full(len(MOUNTS), np.nan)
     for k in range(100):
         drift.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.01 * k), 0.01 * k, silent))
-    assert 2.0 * FIRST_WAY_M < 0.1 * 99
+    assert LONGEST_WAY_M < 0.1 * 99
     here = drift.localized()
     assert (here.pose.x, here.pose.theta) == pytest.approx((9.9, 0.99), abs=1e-9)
     assert here.covariance[2, 2] > 0.0

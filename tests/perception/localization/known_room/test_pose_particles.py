@@ -11,7 +11,7 @@ import pytest
 from perception.localization.known_room.pose_particles import (
     HEADINGS,
     HYPOTHESES_MAX,
-    TEMPER,
+    SHARE_TEMPER,
     Hypotheses,
     HypothesesRecord,
     ParticleScratch,
@@ -117,7 +117,7 @@ def test_the_conclusion_is_the_mixture_of_the_best_hypothesis() -> None:
     log_ratio = float(weight @ one["log_ratio"])
     conclude(found, 12.0, 40, SCRATCH)
     best = found[0].best
-    assert best.share == pytest.approx(1.0 / (1.0 + math.exp(TEMPER * (evidence[1] - evidence[0]))))
+    assert best.share == pytest.approx(1.0 / (1.0 + math.exp(SHARE_TEMPER * (evidence[1] - evidence[0]))))
     assert (best.x, best.y, best.heading) == pytest.approx(weight @ rows)
     expected = np.cov(rows.T, aweights=weight, ddof=0) + np.diag([0.01, 0.01, 0.0])
     found_covariance = [[best.xx, best.xy, best.xh], [best.xy, best.yy, best.yh], [best.xh, best.yh, best.hh]]

@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from perception.localization.known_room.pose_particles import MERGE_M
-from perception.localization.known_room.pose_starts import STARTS_MAX, Starts, offer
+from perception.localization.known_room.pose_starts import START_APART_M, STARTS_MAX, Starts, offer
 from perception.records import array_of, records, zeros
 
 
@@ -17,8 +16,8 @@ def test_of_starts_side_by_side_the_best_is_kept_and_of_too_many_the_best() -> N
     scores = np.random.default_rng(0).permutation(STARTS_MAX + 50).astype(np.float64)
     for k, score in enumerate(scores.tolist()):
         offer(found, 1.0 * k, 0.0, 0.0, score, 0)
-        offer(found, 1.0 * k + 0.9 * MERGE_M, 0.0, 2.0 * math.pi - 0.01, score - 0.5, 0)
-        offer(found, 1.0 * k + 0.9 * MERGE_M, 0.0, 0.01, score + 0.5, 1)
+        offer(found, 1.0 * k + 0.9 * START_APART_M, 0.0, 2.0 * math.pi - 0.01, score - 0.5, 0)
+        offer(found, 1.0 * k + 0.9 * START_APART_M, 0.0, 0.01, score + 0.5, 1)
     kept = array_of(found)["starts"][0]
     assert found[0].count == STARTS_MAX
     assert (kept["profile"] == 1).all()

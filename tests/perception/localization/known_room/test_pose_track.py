@@ -13,7 +13,7 @@ from perception.localization.known_room import pose_track
 from perception.localization.known_room.background import Background
 from perception.localization.known_room.keyframes import KEYFRAMES_MAX, Keyframes
 from perception.localization.known_room.mixed_reflection import LearnedShares
-from perception.localization.known_room.pose_particles import TEMPER
+from perception.localization.known_room.particle_update import TEMPER
 from perception.localization.known_room.pose_track import (
     ALIKE_GAIN,
     ALIKE_WEIGHT,

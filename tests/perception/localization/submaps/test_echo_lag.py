@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from drivers.messages import Firing, Pose
-from perception.localization.submaps.echo_lag import EchoLag, lag_of
-from perception.shared_numbers import OUTLIER_SIGMAS
+from perception.localization.submaps.echo_lag import LAG_REFUTED, EchoLag, lag_of
 from perception.snapshot import put_back, snapshot_of
 from tests.perception.localization.rooms import RING
 from tests.perception.localization.submaps.test_submap_graph import driven
@@ -53,7 +52,7 @@ def test_no_lag_is_not_refuted() -> None:
         assert lag.follow(firing) is firing
         while lag.can_refine:
             lag.refine()
-    assert lag.found().gain < 0.5 * 0.5 * OUTLIER_SIGMAS**2
+    assert lag.found().gain < 0.5 * LAG_REFUTED
     assert abs(lag.found().lag_s) < 0.03
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from perception.kernel import Floats
-from perception.localization.room.range_likelihood import OUTLIERS
 from perception.localization.submaps.line_pairs import (
     BENDS,
+    FALSE_PAIRS,
     PAIR_M,
     PAIR_RAD,
     find_pairs,
@@ -61,7 +61,7 @@ def test_pairs_and_their_pull_are_those_of_matrices() -> None:
             * math.exp(-0.5 * error @ np.linalg.solve(spread, error))
             / (math.tau * math.sqrt(np.linalg.det(spread)))
         )
-        assert probability == pytest.approx(density / (density + OUTLIERS / (4.0 * PAIR_RAD * PAIR_M)), rel=1e-5)
+        assert probability == pytest.approx(density / (density + FALSE_PAIRS / (4.0 * PAIR_RAD * PAIR_M)), rel=1e-5)
         expected += probability * jacobian.T @ np.linalg.solve(own, jacobian)
         force -= probability * jacobian.T @ np.linalg.solve(own, error)
     np.testing.assert_allclose(system, np.column_stack([expected, force]), rtol=1e-5, atol=1e-3)

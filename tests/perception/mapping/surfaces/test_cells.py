@@ -9,18 +9,18 @@ import pytest
 
 from perception.mapping.surfaces import cells
 from perception.mapping.surfaces.parameters import (
-    AGREES_M,
     CELL_M,
     CELLS,
     DIRECTIONS,
+    NEARER_M,
     REACH_M,
     SAMPLES,
+    SILENCE_M,
     WHOLE,
     WHOLE_PASS,
 )
-from perception.mapping.surfaces.records import CellCounts, KeptReading, LocalMap
+from perception.mapping.surfaces.records import BLOCK, CellCounts, KeptReading, LocalMap
 from perception.records import Records, array_of, records, zeros
-from perception.shared_numbers import BLOCK, SILENCE_M
 
 pytestmark = pytest.mark.compiled
 HALF = math.radians(12.0)
@@ -43,7 +43,7 @@ def test_passes_are_the_cells_of_the_beam_before_the_range(half_deg: float, rang
     counts = zeros(CellCounts, 1)
     readings = some(5)
     half = math.radians(half_deg)
-    far = range_m - AGREES_M if range_m <= REACH_M else SILENCE_M
+    far = range_m - NEARER_M if range_m <= REACH_M else SILENCE_M
     expected = np.zeros((CELLS // 2, CELLS // 2, DIRECTIONS))
     middles = (np.arange(CELLS // 2) + 0.5 - 0.25 * CELLS) * 2.0 * CELL_M
     for k in range(5):

@@ -29,9 +29,8 @@ from perception.mapping.surfaces.pieces import (
     offset_of,
     order_cells,
 )
-from perception.mapping.surfaces.records import ANGLES, FREE, CellCounts, LocalMap
+from perception.mapping.surfaces.records import ANGLES, BLOCK, FREE, CellCounts, LocalMap
 from perception.records import Records, Structured, records, zeros
-from perception.shared_numbers import BLOCK
 
 pytestmark = pytest.mark.compiled
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from perception.mapping.surfaces.parameters import (
-    AGREES_M,
     CELL_M,
     CELLS,
     DIRECTIONS,
+    LINK_M,
+    NODE_M,
     PIECE_MIN_M,
     STRENGTH_MIN,
     WEAK_MIN,
@@ -43,8 +44,8 @@ def test_a_bend_is_one_polyline_in_order() -> None:
     found = chains(np.column_stack([np.cos(angles), np.sin(angles)]))
     assert len(found) == 1
     steps = np.hypot(*np.diff(found[0], axis=0).T)
-    assert (steps >= AGREES_M - 1e-9).all()
-    assert (steps <= 2.0 * AGREES_M + CELL_M).all()
+    assert (steps >= NODE_M - 1e-9).all()
+    assert (steps <= LINK_M + CELL_M).all()
     assert steps.sum() == pytest.approx(2.0, abs=0.3)
 
 

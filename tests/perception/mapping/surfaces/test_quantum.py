@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from perception.mapping.surfaces import quantum
-from perception.mapping.surfaces.parameters import REVISITS
+from perception.mapping.surfaces.parameters import REVISITS, SPACING_M
 from perception.mapping.surfaces.records import CellCounts, LocalMap
 from perception.records import records, zeros
-from perception.shared_numbers import FAR, SPACING
 
 pytestmark = pytest.mark.compiled
 HALF = math.radians(12.0)
@@ -23,13 +22,13 @@ def test_a_sensor_that_has_moved_is_kept() -> None:
     local = zeros(LocalMap, 1)
     rooms = records(LocalMap, local)
     quantum.keep(rooms, MOUNTS, np.array([1.0, 0.0, 0.0]), np.array([2.0, math.inf]), 5.0)
-    quantum.keep(rooms, MOUNTS, np.array([1.0 + 0.5 * SPACING, 0.0, 0.0]), np.array([2.0, math.inf]), 5.0)
+    quantum.keep(rooms, MOUNTS, np.array([1.0 + 0.5 * SPACING_M, 0.0, 0.0]), np.array([2.0, math.inf]), 5.0)
     assert local["count"] == 2
-    quantum.keep(rooms, MOUNTS, np.array([1.0 + 1.1 * SPACING, 0.0, 0.0]), np.array([math.nan, 1.0]), 5.0)
+    quantum.keep(rooms, MOUNTS, np.array([1.0 + 1.1 * SPACING_M, 0.0, 0.0]), np.array([math.nan, 1.0]), 5.0)
     assert local["count"] == 3
     readings = local["readings"][0, :3]
-    np.testing.assert_allclose(readings["x"], [0.1, 0.0, 1.1 * SPACING])
-    np.testing.assert_allclose(readings["range_m"], [2.0, FAR, 1.0])
+    np.testing.assert_allclose(readings["x"], [0.1, 0.0, 1.1 * SPACING_M])
+    np.testing.assert_allclose(readings["range_m"], [2.0, quantum.SILENCE, 1.0])
     assert local["centre_x"] == 1.0
 
 
