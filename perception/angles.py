@@ -9,8 +9,6 @@ from perception.kernel import kernel
 
 SAME_RAD: Final = 1e-6
 """Directions that differ by less are the same: poses and mounts are rounded."""
-ROUNDING_RAD: Final = 1e-9
-"""Angles that differ by less are the same but for the rounding of one computation."""
 
 
 @kernel

@@ -16,11 +16,10 @@ import numpy as np
 from config.robot import RingConfig
 from drivers.messages import Firing
 from perception.echo_kind import EchoKind
+from perception.shared_numbers import OUTLIER_SIGMAS
 
 DEPTH_NOISE_M: Final = 3e-3
 """Standard deviation of a range of ultrasonic modules; with the resolution it says which ranges are the same."""
-SAME_DEPTH_SIGMAS: Final = 3.0
-"""Ranges of one surface differ by at most so many standard deviations, beside the resolution."""
 WIDTH_MIN: Final = 0.5
 """A region is at least so many beams wide; narrower ones are strays and ends of others."""
 _UNDECIDED: Final = (0.25, 0.25, 0.25, 0.25)
@@ -66,7 +65,7 @@ def _median(values: list[float]) -> float:
 
 def _regions(ranges: list[float], ring: RingConfig, *, endless: bool) -> list[tuple[int, int]]:
     """Return the first and last bearing of each region; on an endless turn numbers go on beyond the last bearing."""
-    count, same_m = len(ranges), SAME_DEPTH_SIGMAS * DEPTH_NOISE_M + ring.resolution_m
+    count, same_m = len(ranges), OUTLIER_SIGMAS * DEPTH_NOISE_M + ring.resolution_m
     sensor_steps = [
         s.sweep_deg / (s.bearings if s.is_endless else s.bearings - 1) for s in ring.sensors or () if s.servo
     ]

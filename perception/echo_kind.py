@@ -23,13 +23,12 @@ from typing import Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from perception.kernel import Floats
+from perception.shared_numbers import CERTAIN_PROBABILITY
 
 Kind: TypeAlias = Literal["plane", "corner", "edge", "cylinder"]
 KINDS: Final[tuple[Kind, ...]] = ("plane", "corner", "edge", "cylinder")
 RADII_M: Final = (0.03, 0.06, 0.12, 0.2, 0.3, 0.45)
 """Radii of a cylinder, equally probable."""
-SURE_KIND: Final = 0.95
-"""Probability from which on a kind is named."""
 _STARTS: Final = np.radians(np.arange(-24.0, 24.1, 6.0))
 """Bearings beside that of the nearest reading from which a fit may start."""
 _STEPS_MAX: Final = 12
@@ -69,9 +68,9 @@ class EchoKind(NamedTuple):
     def kind(self) -> Kind | Literal["convex", "unknown"]:
         """The kind, if the readings tell it; `convex` if it is an edge or a cylinder but not which; or `unknown`."""
         for kind, probability in zip(KINDS, self.probabilities, strict=True):
-            if probability >= SURE_KIND:
+            if probability >= CERTAIN_PROBABILITY:
                 return kind
-        return "convex" if self.probabilities[2] + self.probabilities[3] >= SURE_KIND else "unknown"
+        return "convex" if self.probabilities[2] + self.probabilities[3] >= CERTAIN_PROBABILITY else "unknown"
 
 
 def echo_kind(

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from config.model import ModelConfig
 from perception.kernel import Floats
-
-BULGE_MIN_M: Final = 1e-9
-"""An open outline that bulges by less is a straight line, m; covers rounding only."""
+from perception.shared_numbers import ROUNDING
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +50,7 @@ class ObjectModel:
         bulge = centroid - 0.5 * (vertices[0] + vertices[-1])
         facing = None
         if not config.closed:
-            straight = math.hypot(*bulge) < BULGE_MIN_M
+            straight = math.hypot(*bulge) < ROUNDING
             across = math.atan2(along[0, 1], along[0, 0]) + 0.5 * math.pi
             facing = across if straight else math.atan2(bulge[1], bulge[0])
         lever_m = None

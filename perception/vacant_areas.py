@@ -15,6 +15,7 @@ from perception.bounds import COUNT, PLACE, bounds, up_to
 from perception.detected_object import DetectedObject
 from perception.map_moves import MapMoves
 from perception.polyline import Polyline
+from perception.shared_numbers import NO_NUMBER
 
 AREAS_MAX: Final = 64
 """Greatest number of areas."""
@@ -22,14 +23,12 @@ RADIUS_MIN_M: Final = 0.3
 """Least radius of an area around a rejected object: another fit of the same readings lies a decimetre beside it."""
 RADIUS_MAX_M: Final = 10.0
 """Largest radius of a vacant area, m."""
-NO_OBJECT: Final = 0
-"""In place of the number of the object for which an area was marked."""
 NO_ROOM: Final = f"{AREAS_MAX} areas are marked as vacant, the most there is room for: lift one first"
 
 AREA: Final = np.dtype(
     [("x", np.float64), ("y", np.float64), ("radius", np.float64), ("number", np.int64), ("object", np.int64)]
 )
-"""An area: its circle, m; its number; number of the object that was rejected there, or `NO_OBJECT`."""
+"""An area: its circle, m; its number; number of the object that was rejected there, or `NO_NUMBER`."""
 
 
 class VacantArea(NamedTuple):
@@ -43,8 +42,8 @@ class VacantArea(NamedTuple):
     """m"""
     radius: float
     """m"""
-    object: int = NO_OBJECT
-    """Number of the object that was rejected there, or `NO_OBJECT`."""
+    object: int = NO_NUMBER
+    """Number of the object that was rejected there, or `NO_NUMBER`."""
 
 
 class VacantAreas:
@@ -73,7 +72,7 @@ class VacantAreas:
         self._polylines: tuple[Polyline, ...] = ()
         self._polylines_seen: tuple[Polyline, ...] = ()
 
-    def mark(self, x: float, y: float, radius: float, detected: int = NO_OBJECT) -> str | None:
+    def mark(self, x: float, y: float, radius: float, detected: int = NO_NUMBER) -> str | None:
         """Add an area; return None, or why there is no room for it.
 
         Parameters

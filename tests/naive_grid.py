@@ -13,6 +13,7 @@ from drivers.messages import Floats
 from perception.mapping.grid import cell_evidence
 from perception.mapping.grid import directed as d
 from perception.mapping.grid.cell_evidence import CERTAIN, FADING_PLACES, NAT, UNDIRECTED
+from perception.mapping.grid.elfes import ARC_SIGMAS
 from perception.mapping.grid.window import SPREAD_CELLS, SPREAD_RELATIVE
 
 
@@ -82,10 +83,10 @@ class NaiveGrid:
     def hit(self, sensor: tuple[float, float, float], r: float, bearing: float, place: int, mirrors: float) -> None:
         """Enter an echo's arc, or its contact where its bearing is known."""
         sigma = self.sigma(r)
-        beam = self.beam(sensor, r + d.UNDIRECTED_ARC_SIGMAS * sigma)
+        beam = self.beam(sensor, r + ARC_SIGMAS * sigma)
         units = (
             (d.DIRECTED_UNIT + d.MIRRORS_UNIT * mirrors, d.DIRECTED_ARC_SIGMAS),
-            (cell_evidence.UNDIRECTED_UNIT, d.UNDIRECTED_ARC_SIGMAS),
+            (cell_evidence.UNDIRECTED_UNIT, ARC_SIGMAS),
         )
         for unit, sigmas in units:
             is_directed = sigmas == d.DIRECTED_ARC_SIGMAS

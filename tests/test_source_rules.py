@@ -59,6 +59,7 @@ WITHOUT_TEST: Final = MappingProxyType(
         "perception/localization/localized_pose.py": "one record",
         "perception/mapping/surfaces/parameters.py": "constants",
         "perception/mapping/surfaces/records.py": "records",
+        "perception/shared_numbers.py": "constants",
         "runtime/console/commands/command.py": "dataclasses and an enumeration",
         "runtime/console/commands/command_error.py": "an exception with one attribute",
         "runtime/console/frames/state_message.py": "typed dictionaries",

@@ -17,7 +17,7 @@ ranges alone decide:
 Each imports only from those above it; `segments`, `circles`, `polygons` and `walls` know nothing of each other (a
 contract in pyproject.toml).
 
-Ranges and poses are in the odometry frame; a range ≥ `inference.range_fit.FAR` means no echo. Evidence is in nats:
+Ranges and poses are in the odometry frame; a range ≥ `FAR` means no echo. Evidence is in nats:
 the log ratio of the readings' likelihood under an explanation to that of an echo from something else, anywhere in
 range. Kernels are pure and allocate nothing.
 """

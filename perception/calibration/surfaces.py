@@ -10,17 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception.kernel import Floats
+from perception.shared_numbers import BESIDE_MAX_RAD, NORMAL_DIRECTIONS
 
-NORMAL_DIRECTIONS: Final = 360
-"""Directions of normals in which walls are looked for."""
 BIN_M: Final = 0.05
 """Width of the bins in which readings vote, m: what wrong mounts and scales displace them by at first."""
 BEARINGS: Final = 9
 """Directions inside a beam in which a reading votes for the centre of a round object."""
 UNSURE_RAD: Final = math.radians(4.0)
 """How far nominal directions and beams may be wrong."""
-BESIDE_MAX_RAD: Final = math.radians(60.0)
-"""Greatest angle beside the beam at which a surface may still be heard at the beam's edge."""
 VOTES_MIN: Final = 25
 """Readings that a surface needs at least."""
 SHARE_MIN: Final = 0.15

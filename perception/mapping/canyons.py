@@ -21,6 +21,7 @@ from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 from perception.percept import Canyon
 from perception.records import Structured
+from perception.shared_numbers import EVEN
 
 SURFACE_REACH_M: Final = 9.0
 """Surfaces farther from the place than this do not count."""
@@ -36,8 +37,6 @@ CLIPPED: Final = 1.25
 """A mouth longer than this times a nearer crossing slants, as one side goes on: the crossing is the mouth then."""
 BRIDGE_WEIGHT: Final = 0.85
 """Weight of a gap that is too narrow, in place of the surface's probability."""
-SURFACE_PROBABILITY_MIN: Final = 0.5
-"""Surfaces less probable than this do not bound a canyon."""
 SURFACES_MIN: Final = 3
 """With fewer surfaces in reach no canyon is looked for."""
 SURFACES_MAX: Final = 16
@@ -107,7 +106,7 @@ def surfaces_of(seen: Iterable[DetectedObject], radii_m: Mapping[str, float], se
     rounds: list[tuple[float, ...]] = []
     for one in seen:
         weight = one.score if one.probability is None else one.probability
-        if weight < SURFACE_PROBABILITY_MIN:
+        if weight < EVEN:
             continue
         if one.ends is not None:
             walls.append((*one.ends, weight))

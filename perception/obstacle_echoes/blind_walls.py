@@ -19,11 +19,12 @@ from typing import Annotated, Final
 import numpy as np
 
 from drivers.messages import Firing, Pose
-from perception.angles import ROUNDING_RAD, wrapped
+from perception.angles import wrapped
 from perception.bounds import CONSTANT, Bound, Flag, Place, bounds
 from perception.kernel import Floats, kernel
 from perception.records import Record, Records, records, zeros
 from perception.sensor_mounts import mounts_at
+from perception.shared_numbers import ROUNDING
 
 TURN_DIRECTIONS: Final = 36
 """Directions of a turn that are distinguished: a wall's normal is known to about the width of a beam."""
@@ -200,7 +201,7 @@ class BlindWalls:
         self._mounts, self._turning, self._half_angle = mounts, turning, half_angle
         self._walls = zeros(BlindWall, TURN_DIRECTIONS)
         self.records = records(BlindWall, self._walls)
-        self.has_gaps = widest_gap(mounts) > 2.0 * half_angle + ROUNDING_RAD
+        self.has_gaps = widest_gap(mounts) > 2.0 * half_angle + ROUNDING
         """Whether there are directions that no beam holds."""
         self.is_blind = has_blind_sides(mounts, half_angle)
         """Whether the robot must look into them; of narrower ones nothing is unknown or presumed."""
@@ -257,9 +258,9 @@ class BlindWalls:
         if not self.is_blind:
             return feet[stands], np.zeros(0), np.zeros((0, 2))
         # What lies partly in a beam is seen as the robot turns a little; beams that touch miss nothing between them.
-        is_unseen = (nearest > self._half_angle + 0.5 * WIDTH_RAD + ROUNDING_RAD) & ~is_known
+        is_unseen = (nearest > self._half_angle + 0.5 * WIDTH_RAD + ROUNDING) & ~is_known
         # At the edge of what is unseen it is looked at whole: else the robot would turn to and fro between two edges.
-        is_edge = (nearest > self._half_angle - 0.5 * WIDTH_RAD + ROUNDING_RAD) & ~is_known
+        is_edge = (nearest > self._half_angle - 0.5 * WIDTH_RAD + ROUNDING) & ~is_known
         is_edge &= np.roll(is_unseen, 1) | np.roll(is_unseen, -1)
         is_unknown = (np.cos(directions - pose.theta) > 0.0) & (is_unseen | is_edge)
         is_presumed = stands & (looked_m > SILENT_WAY_M)

@@ -29,7 +29,6 @@ from perception.obstacle_echoes.blind_walls import BlindWalls
 from perception.obstacle_echoes.unheard_echoes import (
     ALONE,
     SILENT,
-    SPREAD_M,
     UNCHANGED,
     UnheardEcho,
     UnheardEchoes,
@@ -39,6 +38,7 @@ from perception.obstacle_echoes.unheard_echoes import (
 )
 from perception.records import Records
 from perception.sensor_mounts import RingPose, mounts_at, ring_pose
+from perception.shared_numbers import SAME_ECHO_M
 
 LOOKS_REMEMBERED: Final = 16
 """Readings of each sensor that are kept, each in a direction of its own; in a turn faster than this holds, fewer."""
@@ -46,8 +46,7 @@ SAME_MAX: Final = 4
 """Looks of a sensor in one direction that are kept: the newest ones, which close gaps although a reading of either
 neighbour fails, and the oldest, as the beams of those between lie within its own and the newest."""
 STEADY_S: Final = 1.5
-"""An echo is steady if another look, by the same sensor or another one, put one within `SPREAD_M` no longer ago than
-this."""
+"""An echo is steady if another look, by whichever sensor, put one within `SAME_ECHO_M` no longer ago than this."""
 
 TOLERANCE_M: Final = 0.005
 """A reading within this of the ring's reach is a silence: so some rings report it, m."""
@@ -85,7 +84,7 @@ def is_steady(kept: KeptLooks, px: float, py: float, t: float) -> bool:
     for j in range(times.shape[0]):
         for k in range(times.shape[1]):
             is_young = heard[j, k] and t - times[j, k] <= STEADY_S
-            if is_young and math.hypot(points[j, k, 0] - px, points[j, k, 1] - py) < SPREAD_M:
+            if is_young and math.hypot(points[j, k, 0] - px, points[j, k, 1] - py) < SAME_ECHO_M:
                 return True
     return False
 

@@ -28,11 +28,10 @@ from perception.obstacle_echoes.blind_walls import TURN_DIRECTIONS, WIDTH_RAD, B
 from perception.obstacle_echoes.remembered_echoes import RememberedEchoes
 from perception.records import Record, Records, records, zeros
 from perception.sensor_mounts import RingPose
+from perception.shared_numbers import SAME_ECHO_M
 
 COME_NEARER_M: Final = 1e-3
 """A robot that has come nearer by this since a sensor looked last has moved, m."""
-SPREAD_M: Final = 0.3
-"""Echoes that are nearer to each other than this come from the same place, m."""
 AWAY_M: Final = 0.1
 """A robot that is farther from an echo by this than where it was lost has had the chance to hear it again, m."""
 SILENT_ROUNDS: Final = 4
@@ -115,7 +114,7 @@ def reaches(r: float, mount: Floats, pose: RingPose, core: float, one: UnheardEc
     own_x, own_y = x + c * mount[0] - s * mount[1], y + s * mount[0] + c * mount[1]
     dx, dy = one.x - own_x, one.y - own_y
     ahead, across = dx * math.cos(axis) + dy * math.sin(axis), abs(dy * math.cos(axis) - dx * math.sin(axis))
-    return bool(0.0 < ahead < r + SPREAD_M and across < ahead * math.tan(core))
+    return bool(0.0 < ahead < r + SAME_ECHO_M and across < ahead * math.tan(core))
 
 
 @kernel

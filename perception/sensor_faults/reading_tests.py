@@ -21,6 +21,7 @@ from perception.sensor_faults.silence import weigh_silence
 from perception.sensor_faults.turning import follow_turn, repeats_through_turn
 from perception.sensor_faults.wall import NOISE_SHARE, is_along_wall
 from perception.sensor_mounts import RingPose
+from perception.shared_numbers import SAME_ECHO_M
 
 # The thresholds below were tuned on the simulated halls of tests/perception/sensor_faults/test_monitor.py: no healthy
 # sensor is masked in any hall, and every faulty one is found.
@@ -38,8 +39,6 @@ PASSED_READINGS_MIN: Final = 40
 """Stuck after passing by: at least so many equal readings."""
 PASSED_CHANGES_MIN: Final = 12
 """Stuck after passing by: changes of either neighbour's reading that count even without leaps."""
-LEAP_M: Final = 0.3
-"""A change of the reading by more than this is a leap, m."""
 REGULARITY_MIN: Final = 0.8
 """Below this regularity the sets do not recur, and crosstalk is not tested."""
 RECOVERY_READINGS: Final = 5
@@ -105,7 +104,7 @@ def count_changes(c: SensorMemory, r: float, tolerance: float) -> None:
     if first or has_changed:
         steady = r if first else c.last_m
         c.counts.changes += 1
-        c.counts.leaps += has_changed and not abs(steady - c.steady_m) <= LEAP_M
+        c.counts.leaps += has_changed and not abs(steady - c.steady_m) <= SAME_ECHO_M
         c.steady_m = steady
 
 

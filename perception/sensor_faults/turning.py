@@ -15,8 +15,8 @@ from perception.kernel import kernel
 from perception.records import Records
 from perception.sensor_faults.memory import RingMemory, SensorMemory
 from perception.sensor_faults.report import STUCK
-from perception.sensor_faults.silence import SAME_ECHO_M
 from perception.sensor_faults.wall import NOISE_SHARE
+from perception.shared_numbers import SAME_ECHO_M
 
 IN_PLACE_M: Final = 0.1
 """A ring that moves farther no longer turns in place, m."""

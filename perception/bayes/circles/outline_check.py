@@ -17,18 +17,17 @@ from perception.bayes.inference.cross_path import is_crossed
 from perception.bayes.inference.likelihood import bounded_exp
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY
-from perception.bayes.memory.parameters import EXPLAINED_ERROR_SIGMAS
+from perception.bayes.memory.parameters import SYSTEMATIC_M
 from perception.bayes.memory.scratch import BearingErrors
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CircleTrack, StateRecord
 from perception.kernel import kernel
+from perception.shared_numbers import OUTLIER_SIGMAS
 
 OUTLINE_SIGMA_M: Final = 0.05
 """Deviation of an unknown outline from a model's: that of boxes of its size."""
 OUTLINE_SCALE_RAD: Final = 0.45
 """Bearing over which that deviation changes."""
-OUTLINE_SURFACE_M: Final = 0.005
-"""Deviation of a model's own surface, and of the poses from which it was heard."""
 OUTLINE_READINGS_MIN: Final = 3
 """Least readings of a bearing that counts, so that their median ignores an outlier."""
 OUTLINE_BEARINGS_MIN: Final = 4
@@ -96,7 +95,7 @@ def average_errors(bearing: BearingErrors) -> None:
     """Write the mean of a bearing's errors (m) and its accuracy, the inverse of that mean's standard deviation (1/m).
 
     It needs the errors and the sum of their variances, of `sort_errors`. An error farther from the median than
-    `EXPLAINED_ERROR_SIGMAS` counts as that far. With fewer than `OUTLINE_READINGS_MIN` errors the accuracy is 0 and
+    `OUTLIER_SIGMAS` counts as that far. With fewer than `OUTLINE_READINGS_MIN` errors the accuracy is 0 and
     the mean is not written.
     """
     n = bearing.count
@@ -105,12 +104,12 @@ def average_errors(bearing: BearingErrors) -> None:
         return
     variance = bearing.variance / n
     median = 0.5 * (bearing.errors[(n - 1) // 2] + bearing.errors[n // 2])
-    most = EXPLAINED_ERROR_SIGMAS * math.sqrt(variance)
+    most = OUTLIER_SIGMAS * math.sqrt(variance)
     total = 0.0
     for k in range(n):
         total += min(most, max(-most, bearing.errors[k] - median))
     bearing.mean = median + total / n
-    bearing.accuracy = 1.0 / math.sqrt(variance / n + OUTLINE_SURFACE_M**2)
+    bearing.accuracy = 1.0 / math.sqrt(variance / n + SYSTEMATIC_M**2)
 
 
 @kernel
@@ -187,7 +186,7 @@ def round_lead(s: StateRecord, p: SettingsRecord, n: int) -> float:
         if own.ahead[j] < p[0].cos_half_angle * own.distance[j]:
             continue
         variance = var0 + rel2 * q.range_m * q.range_m
-        most = EXPLAINED_ERROR_SIGMAS * math.sqrt(variance)
+        most = OUTLIER_SIGMAS * math.sqrt(variance)
         e = min(most, max(-most, e))
         ux, uy = own.slope_x[j], own.slope_y[j]
         is_slant = is_crossed(q) or own.rays > 0

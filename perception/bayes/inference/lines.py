@@ -11,12 +11,10 @@ import math
 
 from perception.bayes.inference.cross_path import is_crossed, over_line
 from perception.bayes.inference.noise_estimation import noise_variance
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import MAX_LINES, Reading
 from perception.bayes.memory.parameters import (
     CIRCLE_WALL_BEHIND,
     CIRCLE_WALL_BEYOND_M,
-    EXPLAINED_ERROR_SIGMAS,
     LINE_ANGLE_DRIFT_RAD2,
     LINE_ANGLE_VARIANCE_RAD2,
     LINE_DISTANCE_DRIFT_M2,
@@ -42,6 +40,7 @@ from perception.bayes.memory.scratch import ON_LINE, UNEXPLAINED, LineFit, LineS
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import Line, StateRecord
 from perception.kernel import kernel
+from perception.shared_numbers import FAR, OUTLIER_SIGMAS
 
 
 @kernel
@@ -241,7 +240,7 @@ def update_lines(s: StateRecord, p: SettingsRecord, m: int) -> None:
                 across = line.normal_x * q.listener_x + line.normal_y * q.listener_y
                 expected, _, _ = over_line(q, line.normal_x, line.normal_y, expected + 0.5 * across)
             var = var0 + rel2 * expected * expected
-            tight = half_box + LINE_SLACK_M + EXPLAINED_ERROR_SIGMAS * math.sqrt(max(var - half_box**2 / 3.0, 0.0))
+            tight = half_box + LINE_SLACK_M + OUTLIER_SIGMAS * math.sqrt(max(var - half_box**2 / 3.0, 0.0))
             associates = line.high - line.low > p[0].associating_line_m
             if dot >= p[0].cos_may_answer:
                 e = r - expected

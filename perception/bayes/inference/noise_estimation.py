@@ -11,13 +11,10 @@ from __future__ import annotations
 import math
 
 from perception.bayes.inference.likelihood import level_of, log_likelihood
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.parameters import (
-    CERTAIN_PROBABILITY,
     CURVATURE_VARIANCE_M2,
     ELSEWHERE_PER_M,
-    EXPLAINED_ERROR_SIGMAS,
     RANGE_VARIANCE_MIN_M2,
     RESIDUAL_EVERY,
     RESIDUAL_HITS_MIN,
@@ -29,6 +26,7 @@ from perception.bayes.memory.settings_record import NOISES, Settings
 from perception.bayes.memory.state import ESTABLISHED, CircleTrack, State
 from perception.kernel import Floats, kernel
 from perception.records import Records
+from perception.shared_numbers import CERTAIN_PROBABILITY, FAR, OUTLIER_SIGMAS
 
 
 @kernel
@@ -41,7 +39,7 @@ def noise_variance(s: Records[State], p: Records[Settings]) -> tuple[float, floa
 @kernel
 def tolerance_m(half_box: float, var: float) -> float:
     """Return the greatest error of an explained range, m, for rounding ± `half_box` (m) and variance `var` (m²)."""
-    return half_box + EXPLAINED_ERROR_SIGMAS * math.sqrt(var)
+    return half_box + OUTLIER_SIGMAS * math.sqrt(var)
 
 
 @kernel

@@ -6,13 +6,13 @@ import math
 from typing import Final
 
 from perception.bayes.inference.noise_estimation import noise_variance, tolerance_m
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.inference.reservoir import copy_reading
 from perception.bayes.memory.parameters import STILL_COS, STILL_M
 from perception.bayes.memory.scratch import UNEXPLAINED
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import Sensor, StateRecord
 from perception.kernel import Floats, kernel
+from perception.shared_numbers import FAR
 
 COORDINATE_MAX_M: Final = 0.5 * FAR
 """A position farther than this from the odometry's origin is invalid: ranges this long mean silence."""

@@ -29,9 +29,7 @@ from perception.bayes.memory.scratch import CircleFit, LineFit, LineScore, Predi
 from perception.bayes.memory.settings_record import Settings
 from perception.kernel import kernel
 from perception.records import Records
-
-FAR: Final = 1e6
-"""A range of this much or more (m) means no echo."""
+from perception.shared_numbers import FAR
 
 NONE_YET: Final = 1e9
 """Initial least range and extent (m) of an object without a hit."""

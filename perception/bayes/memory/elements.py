@@ -69,7 +69,7 @@ class Reading(Record):
     """Its axis, a unit vector."""
     axis_y: Place
     range_m: Annotated[float, RANGE]
-    """Range, m; at least `range_fit.FAR` without an echo."""
+    """Range, m; at least `FAR` without an echo."""
     listener_x: Place
     """Position of the sensor that heard it, from there, m; 0, 0 where it is the same one."""
     listener_y: Place

@@ -55,7 +55,8 @@ START_NOISE_NAT: Final = 6.0
 ROUGHNESS_GATE_NAT: Final = 20.0
 """Noises less likely than the best by this, by roughness, are ruled out."""
 TRIPLE_MAX_M: Final = 1.0 * FOOT_M
-"""Greatest distance between the positions of a triple: farther apart they rarely see one surface."""
+"""Greatest distance between the positions of a triple, or of neighbours that did not fire together: farther apart
+they rarely see one surface."""
 CURVATURE_VARIANCE_M2: Final = 1e-4 * FOOT_M * FOOT_M
 """Variance that a curved surface adds to the middle of a triple."""
 ROUGHNESS_MEMORY: Final = 0.997
@@ -66,8 +67,8 @@ ELSEWHERE_PER_M: Final = 0.02 / FOOT_M
 """Density of a middle reading that hit something else."""
 RANGE_VARIANCE_MIN_M2: Final = 1e-6 * FOOT_M * FOOT_M
 """Least variance of a range, and of a fitted centre, so that perfect ones do not divide by zero."""
-EXPLAINED_ERROR_SIGMAS: Final = 3.0
-"""Greatest error of an explained range, in σ, beyond half its rounding; farther ones count as that far in a mean."""
+SYSTEMATIC_M: Final = 0.005
+"""Error of poses and surfaces that the mean of many readings keeps."""
 RESIDUAL_HITS_MIN: Final = 25.0
 """A certain object's residuals count from this many hits on."""
 RESIDUAL_EVERY: Final = 3
@@ -104,8 +105,6 @@ BASELINE_MAX_M: Final = 2.6 * FOOT_M
 """Longest baseline that is tried."""
 NEIGHBOUR_BASELINE_MIN_M: Final = 0.3 * FOOT_M
 """Shortest baseline of neighbours that did not fire together."""
-NEIGHBOUR_BASELINE_MAX_M: Final = 1.0 * FOOT_M
-"""Longest baseline of neighbours that did not fire together."""
 MAPPED_LENGTH_MIN_M: Final = 0.2 * FOOT_M
 """Least length of a mapped segment: a shorter one's direction is too uncertain for the relaxation."""
 HYPOTHESIS_SIGMA_MAX_M: Final = 0.7 * FOOT_M
@@ -181,7 +180,7 @@ ATTRACTING_MIN: Final = 3
 """Fewer segments than this do not move a hypothesis."""
 OTHER_FIT_STEPS: Final = 4
 """Steps of the relaxation and of the fits of a circle that has no track yet, and of an explanation other than a
-track's own."""
+track's or wall's own."""
 CIRCLE_RESTS_RAD: Final = 0.005
 """A circle's relaxation ends with turns below this and shifts below `CIRCLE_RESTS_M`."""
 CIRCLE_RESTS_M: Final = CIRCLE_RESTS_RAD * FOOT_M
@@ -327,8 +326,6 @@ NO_WALL_LEAD_NAT: Final = -4.0
 """Lead of a wall at which it is excluded. Walls are the most frequent alternative."""
 NAMED_DISPERSION_MIN: Final = 0.008
 """Least dispersion of the axes of an object seen from two sides; an object straight ahead has less."""
-NAME_KEPT_PROBABILITY: Final = 0.5
-"""Least probability at which a name is kept: likelier than everything else together."""
 NAMED_SIGMA_MAX_M: Final = 0.17 * FOOT_M
 """Greatest standard deviation of a named circle along either axis."""
 PLACED_SIGMA_M: Final = 0.15
@@ -383,8 +380,6 @@ UNSURE_FACTOR: Final = 4.0
 """Factor on the evidence of an object that is not certain, so that it is refined earlier."""
 UNSURE_ROOT_M: Final = 0.03 * FOOT_M
 """An object is not certain if its position is less certain than this, and perhaps wrong."""
-CERTAIN_PROBABILITY: Final = 0.95
-"""An object less probable than this is not certain."""
 RESERVOIR_OFFSET: Final = 8.0
 """Readings added to an object's count, so that an object with few is not refined at every reading."""
 FINAL_VALUE: Final = 1e-6

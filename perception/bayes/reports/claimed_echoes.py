@@ -12,13 +12,13 @@ import math
 import numpy as np
 
 from perception.bayes.inference.cross_path import LENGTH_MIN_M
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import Memory
 from perception.bayes.walls.contact import CORNER_SLACK_M, EXPLAINED_SIGMAS
 from perception.bayes.walls.report import has_mirrors
 from perception.kernel import Floats, Ints
 from perception.records import Structured
+from perception.shared_numbers import FAR
 
 
 def own_echoes(circles: Structured, surfaces: Floats, memory: Memory, p: SettingsRecord) -> Ints:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.scratch import POLYGON
 from perception.bayes.memory.settings_record import SettingsRecord
@@ -18,6 +17,7 @@ from perception.bayes.walls.contact import (
     wall_normal,
 )
 from perception.kernel import Floats, kernel
+from perception.shared_numbers import FAR
 
 
 @kernel

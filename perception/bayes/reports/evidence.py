@@ -13,7 +13,7 @@ import numpy as np
 from perception.bayes.inference.beam import answer
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.inference.occlusion import find_others, is_relevant
-from perception.bayes.inference.range_fit import FAR, score_circle
+from perception.bayes.inference.range_fit import score_circle
 from perception.bayes.inference.reservoir import add_crosses, copy_reservoir
 from perception.bayes.memory.elements import COMPARED_MAX, Reading
 from perception.bayes.memory.scratch import OtherCircle, Predictions, Score
@@ -23,6 +23,7 @@ from perception.bayes.polygons.likelihood import score_polygon
 from perception.edits import Arc, Evidence
 from perception.kernel import Floats, kernel
 from perception.records import Records, records, zeros
+from perception.shared_numbers import FAR
 
 
 @kernel

@@ -8,15 +8,14 @@ from __future__ import annotations
 import math
 
 from perception.bayes.inference.noise_estimation import noise_variance
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import HISTORY, Reading
 from perception.bayes.memory.parameters import (
     BASELINE_MAX_M,
     BASELINE_MIN_M,
     BASELINES,
     MAPPED_LENGTH_MIN_M,
-    NEIGHBOUR_BASELINE_MAX_M,
     NEIGHBOUR_BASELINE_MIN_M,
+    TRIPLE_MAX_M,
 )
 from perception.bayes.memory.scratch import PairSegment
 from perception.bayes.memory.settings_record import SettingsRecord
@@ -24,6 +23,7 @@ from perception.bayes.memory.state import StateRecord
 from perception.bayes.segments.segment_list import put_segment
 from perception.bayes.segments.segment_pairs import tangent
 from perception.kernel import kernel
+from perception.shared_numbers import FAR
 
 
 @kernel
@@ -114,10 +114,7 @@ def pair_in_ring(s: StateRecord, p: SettingsRecord, i: int, m: int, time_s: floa
             at = (other.kept - 1) % HISTORY
             old = other.history[at]
             base = math.hypot(q.x - old.x, q.y - old.y)
-            if (
-                time_s - other.times_s[at] < p[0].pair_gap_s
-                and NEIGHBOUR_BASELINE_MIN_M < base < NEIGHBOUR_BASELINE_MAX_M
-            ):
+            if time_s - other.times_s[at] < p[0].pair_gap_s and NEIGHBOUR_BASELINE_MIN_M < base < TRIPLE_MAX_M:
                 made = add_pair(s, p, i, old, var, made)
     return made
 

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception.bayes.circles.outline_check import OUTLINE_READINGS_MIN
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.state import FREE, TENTATIVE, CircleTrack, PolygonTrack
 from perception.bounds import COUNT, FLAG, PLACE, Fields, up_to
 from perception.kernel import Floats
 from perception.map_moves import MapMoves
 from perception.records import Structured
+from perception.shared_numbers import FAR
 
 ARCHIVED_READINGS: Final = 48
 """Readings of an archived track: `OUTLINE_READINGS_MIN` of 16 bearings, or more of fewer."""

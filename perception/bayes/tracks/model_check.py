@@ -15,11 +15,9 @@ import math
 
 from perception.bayes.inference.cross_path import circle_error, is_crossed, over_line
 from perception.bayes.inference.likelihood import level_of, log_likelihood
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import BEARING_BINS, Reading
 from perception.bayes.memory.parameters import (
     APART_RADII,
-    CERTAIN_PROBABILITY,
     CONFIRMED_SIDES,
     IN_WALL_NAT,
     READINGS_MEMORY,
@@ -44,6 +42,7 @@ from perception.bayes.walls.contact import (
 )
 from perception.bayes.walls.corners import KEPT
 from perception.kernel import kernel
+from perception.shared_numbers import CERTAIN_PROBABILITY, FAR
 
 
 @kernel

@@ -10,12 +10,10 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import MAX_POLYGONS, POLYGON_BIN_CAPACITY
 from perception.bayes.memory.parameters import (
     ALONE_LEAD_NAT,
     IN_WALL_NAT,
-    NAME_KEPT_PROBABILITY,
     NAMED_DISPERSION_MIN,
     NAMED_OVER_UNKNOWN,
     NAMED_OVER_UNKNOWN_ALONE,
@@ -34,6 +32,7 @@ from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import ESTABLISHED, FREE, CircleTrack, CircleTracks, PolygonTrack, StateRecord
 from perception.kernel import Ints, kernel
 from perception.records import Record, Records
+from perception.shared_numbers import EVEN, FAR
 
 OVERLAP_MAX_M: Final = 0.1 * FOOT_M
 """Two named circles overlap by no more than this, which their positions may be wrong by."""
@@ -117,8 +116,8 @@ def update_name(
     if (
         track.status != ESTABLISHED
         or track.kind >= p[0].model_count
-        or track.probability < min(least, NAME_KEPT_PROBABILITY)
-        or is_name_doubtful(track, p, NAME_KEPT_PROBABILITY if track.is_named == 1 else sure, careful)
+        or track.probability < min(least, EVEN)
+        or is_name_doubtful(track, p, EVEN if track.is_named == 1 else sure, careful)
     ):
         track.is_named = 0
         return

@@ -14,12 +14,10 @@ from perception.bayes.inference.lines import update_lines
 from perception.bayes.inference.noise_estimation import add_roughness, choose_noise, noise_variance, tolerance_m
 from perception.bayes.inference.occlusion import is_elsewhere
 from perception.bayes.inference.placement import COORDINATE_MAX_M, place_readings
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.inference.reservoir import copy_reading, has_room, keep_reading
 from perception.bayes.memory.elements import CROSS_EVERY, CROSS_HISTORY, HISTORY, Reading
 from perception.bayes.memory.parameters import (
     ASSOCIATION_MARGIN_M,
-    CERTAIN_PROBABILITY,
     HYPOTHESES_PER_FIRING,
     KEEPING_MARGIN_M,
     STILL_COS,
@@ -35,6 +33,7 @@ from perception.bayes.tracks.track_selection import is_waiting
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
 from perception.sensor_mounts import RingPose
+from perception.shared_numbers import CERTAIN_PROBABILITY, FAR
 
 
 @kernel

@@ -26,7 +26,6 @@ from perception.bayes.inference.reservoir import add_crosses, copy_reservoir
 from perception.bayes.inference.track_labels import drop_track, hold, may_become, merge_duplicates
 from perception.bayes.memory.parameters import (
     CENTRE_VARIANCE_MAX_M2,
-    CERTAIN_PROBABILITY,
     CORNER_MISS_SHARE,
     DOUBT_PROBABILITY,
     DOUBTED_DISPERSION_SHARE,
@@ -69,6 +68,7 @@ from perception.bayes.tracks.model_check import check_model, count_names, is_car
 from perception.bayes.tracks.naming import update_name, withdraw_overlapping
 from perception.bayes.tracks.track_selection import choose_circle, is_waiting
 from perception.kernel import kernel
+from perception.shared_numbers import CERTAIN_PROBABILITY
 
 
 @kernel

@@ -13,7 +13,6 @@ from typing import Final
 
 from perception.bayes.memory.elements import MAX_POLYGONS
 from perception.bayes.memory.parameters import (
-    CERTAIN_PROBABILITY,
     FINAL_VALUE,
     PASSED_OVER_MAX,
     RESERVOIR_OFFSET,
@@ -23,6 +22,7 @@ from perception.bayes.memory.parameters import (
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import FREE, AnyTrack, CircleTrack, CircleTracks, StateRecord
 from perception.kernel import kernel
+from perception.shared_numbers import CERTAIN_PROBABILITY
 
 OVERDUE: Final = 1e9
 """Priority of a track that was passed over more than `PASSED_OVER_MAX` times."""

@@ -31,8 +31,17 @@ CIRCLE_MARGIN_M: Final = 0.05
 """Distance of a circle's centre outside the beam at which it may still answer."""
 END_SLACK_M: Final = 0.05
 """Uncertainty of the place of a wall's end."""
+END_MARGIN_M: Final = 0.15
+"""What lies nearer than this to the end of a wall is the end itself: corners are farther beyond it, and what shows
+how walls answer is farther inside."""
+EDGE_SIGMA_M: Final = 0.1
+"""Uncertainty of an edge along its wall, before its echoes: after a move by as much it is another place. An edge that
+its own echoes place no better than this along some axis was heard from one direction: so the wall answers where it
+goes on."""
+FIT_ROUNDS: Final = 3
+"""Fits of a new wall, or of the place of a point, each with the readings that the one before chooses."""
 CORNER_SLACK_M: Final = 0.03
-"""Uncertainty of the place of a corner."""
+"""Uncertainty of the place of a corner, and the greatest of a point that its echoes may show."""
 HIDING_PROBABILITY: Final = 0.9
 """Least probability of a round object without a name that hides what lies behind it, and that explains a wall's
 echoes."""

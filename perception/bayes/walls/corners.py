@@ -26,6 +26,8 @@ from perception.bayes.memory.wall_records import (
     WallMap,
 )
 from perception.bayes.walls.contact import (
+    CORNER_SLACK_M,
+    EDGE_SIGMA_M,
     EXPLAINED_SIGMAS,
     FIRM_WEIGHT,
     HEARD_REACH_M,
@@ -47,18 +49,15 @@ SAME_CORNER_M: Final = 0.2
 """Corners and edges nearer to each other than this are one."""
 CORNER_ECHOES_MIN: Final = 3.0
 """Echoes of a sure corner, which must also outnumber its passes."""
-EDGE_SIGMA_M: Final = 0.1
-"""Uncertainty of an edge along its wall, before its echoes; after a move by as much it is another place."""
 EDGE_SAME_M: Final = 0.3
-"""How far a point may lie from the end of a span that is its own."""
+"""How far a point may lie from the end of a span that is its own, and from a corner or an edge that is known
+better."""
 EDGE_OFF_M: Final = 0.1
 """Greatest distance of an edge from its wall's line."""
 EDGE_ECHOES_MIN: Final = 4.0
 """Echoes of a sure edge."""
 CORNER_SYSTEMATIC_M: Final = 0.002
 """Least uncertainty of a line at a corner."""
-POINT_SLACK_M: Final = 0.03
-"""Greatest uncertainty of a point that its echoes may show."""
 PASS_SLACK_M: Final = 0.1
 """A range this much longer than to a point passed it."""
 ALONE_LEAD: Final = 2.0
@@ -338,7 +337,7 @@ def point_of(
         across = (
             dx * dx * corner.covariance_xx + 2.0 * dx * dy * corner.covariance_xy + dy * dy * corner.covariance_yy
         )
-        sigma = math.sqrt(range_sigma(room, d) ** 2 + min(across / (d * d), POINT_SLACK_M**2))
+        sigma = math.sqrt(range_sigma(room, d) ** 2 + min(across / (d * d), CORNER_SLACK_M**2))
         error = abs(q.range_m - d) / (EXPLAINED_SIGMAS * sigma)
         if error < least:
             least = error
@@ -383,7 +382,7 @@ def enter_looks(
             continue
         # No echo says nothing of what is farther than a sensor hears.
         is_passed = min(q.range_m, p[0].range_max_m) > (
-            d + EXPLAINED_SIGMAS * range_sigma(room, d) + PASS_SLACK_M + POINT_SLACK_M
+            d + EXPLAINED_SIGMAS * range_sigma(room, d) + PASS_SLACK_M + CORNER_SLACK_M
         )
         if is_passed and is_hidden(tracks, q, corner.x, corner.y):
             continue

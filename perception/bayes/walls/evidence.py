@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.memory.parameters import OTHER_FIT_STEPS, SYSTEMATIC_M
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.wall_records import Wall
 from perception.bayes.walls.bins import is_covered, mean_error, middle_of
@@ -19,8 +20,6 @@ BARREL_RADIUS_M: Final = 0.7
 """Radius of the largest barrel: a wall must explain its echoes better than such a round object."""
 DRUM_RADIUS_M: Final = 0.3
 """Radius of a drum, the other round object that a wall must exceed."""
-RIVAL_STEPS: Final = 4
-"""Steps of the fit of a rival."""
 RIVAL_OFF_M: Final = 0.2
 """Standard deviation of a rival's nearest point across the line, before the echoes."""
 RIVAL_ALONG_M: Final = 0.5
@@ -39,8 +38,6 @@ SURE_SPAN_WEIGHT: Final = 6.0
 """Least weight of a span of a new wall, or of one that a corner proves; its places are sure to be its wall's."""
 LINE_MISFIT_MAX: Final = 2.5
 """Greatest χ² of the line of a new wall, and of a reported one, for each degree of freedom."""
-SYSTEMATIC_M: Final = 0.005
-"""Error that the mean of many readings keeps."""
 SPAN_CHI2_MIN: Final = -2.0
 """Least evidence of each single span."""
 WALL_MIN_M: Final = 0.5
@@ -110,7 +107,7 @@ def circle_chi2(wall: Wall, first: int, end: int, radius: float, p: SettingsReco
     behind = radius
     nx, ny = wall_normal(wall)
     chi2 = 0.0
-    for step in range(RIVAL_STEPS + 1):
+    for step in range(OTHER_FIT_STEPS + 1):
         if step == 3 and chi2 > limit:
             break
         chi2 = 0.0
@@ -131,9 +128,9 @@ def circle_chi2(wall: Wall, first: int, end: int, radius: float, p: SettingsReco
                 reach = math.sqrt(across * across + beside * beside)
                 e = d - reach + radius
                 w = 1.0 / (1.0 / of.precision + SYSTEMATIC_M**2)
-                if step < RIVAL_STEPS:
+                if step < OTHER_FIT_STEPS:
                     chi2 += min(STRAY_CHI2, w * e * e)
-                if step == RIVAL_STEPS:
+                if step == OTHER_FIT_STEPS:
                     q = of.newest
                     dx = x + behind * nx - q.x
                     dy = y + behind * ny - q.y
@@ -148,7 +145,7 @@ def circle_chi2(wall: Wall, first: int, end: int, radius: float, p: SettingsReco
                     h_bb += w * jb * jb
                     g_a += w * ja * e
                     g_b += w * jb * e
-        if step < RIVAL_STEPS:
+        if step < OTHER_FIT_STEPS:
             det = h_aa * h_bb - h_ab * h_ab
             along += (h_bb * g_a - h_ab * g_b) / det
             behind += (h_aa * g_b - h_ab * g_a) / det

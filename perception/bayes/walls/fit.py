@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.memory.parameters import SYSTEMATIC_M
 from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import StateRecord
 from perception.bayes.memory.wall_records import CANDIDATE, SPANS_MAX, WALL_BIN_M, WALL_BINS, Wall, WallMap
 from perception.bayes.walls.bins import HALF, clear_wall, is_covered, mean_error, middle_of
 from perception.bayes.walls.contact import are_mirrors, edges_answer
-from perception.bayes.walls.evidence import SYSTEMATIC_M, judge
+from perception.bayes.walls.evidence import judge
 from perception.bayes.walls.numbers import number_spans
 from perception.kernel import kernel
+from perception.shared_numbers import OUTLIER_SIGMAS
 
 SLOPE_SIGMA: Final = 0.15
 """Prior of a wall's slope in its frame."""
@@ -22,7 +24,8 @@ OFFSET_INFORMATION: Final = 1e-3
 WALL_WEIGHT_MIN: Final = 3.0
 """A wall of less weight ends, and a span of less is not reported."""
 GAP_MAX_M: Final = 0.75
-"""Longest gap without readings inside a span; where everything echoes, an opening's width is one too long."""
+"""Longest gap without readings inside a span; where everything echoes, an opening's width is one too long. So far a
+wall may continue beyond its spans."""
 ROUGH_WEIGHT_MIN: Final = 0.6
 """Where everything echoes, a bin counts if it holds more than one echo from a beam's edge: echoes of posts lie near
 the line too."""
@@ -38,10 +41,8 @@ CRACK_PASSES_MIN: Final = 3.0
 """Passes in a narrower gap that make it an opening."""
 STRAY_BINS: Final = 2
 """Neighbours on either side with which a bin is compared with the line."""
-STRAY_SIGMAS: Final = 3.0
-"""Echoes whose mean lies behind the line by so many σ and `STRAY_SLACK_M` come from something else."""
 STRAY_SLACK_M: Final = 0.012
-"""Distance in `STRAY_SIGMAS`: such echoes come mostly from the ends of an opening."""
+"""Distance in `OUTLIER_SIGMAS`: such echoes come mostly from the ends of an opening."""
 STRAY_BEFORE_M: Final = 0.03
 """Echoes that lie this far before the line come from another wall at its corner, before that was known."""
 PASSED_MIN: Final = 1.5
@@ -152,7 +153,7 @@ def is_stray(room: WallMap, wall: Wall, b: int) -> bool:
             error += of.precision * mean_error(wall, k)
     if edges_answer(room) and passes >= PASSED_MIN and passes > PASSED_SHARE * total:
         return True
-    slack = STRAY_SIGMAS / math.sqrt(precision)
+    slack = OUTLIER_SIGMAS / math.sqrt(precision)
     return error / precision > slack + STRAY_SLACK_M or error / precision < -slack - STRAY_BEFORE_M
 
 

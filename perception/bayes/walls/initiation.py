@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import Memory, StateRecord
@@ -27,6 +26,7 @@ from perception.bayes.memory.wall_records import (
 )
 from perception.bayes.walls.bins import SILENT_PASS, bin_of, clear_wall, enter_reading
 from perception.bayes.walls.contact import (
+    FIT_ROUNDS,
     FOOT,
     NOWHERE,
     SLANTING_MIN_COS,
@@ -42,6 +42,7 @@ from perception.bayes.walls.numbers import number_spans
 from perception.bayes.walls.support import copy_near, support
 from perception.kernel import kernel
 from perception.records import Structured
+from perception.shared_numbers import FAR
 
 CANDIDATES_MAX: Final = 8
 """Lines that are scored for one echo."""
@@ -68,8 +69,6 @@ NEW_WALL_SLOPE_VARIANCE: Final = 0.04**2
 KNOWN_SIGMA_M: Final = 0.06
 """Readings that touch a candidate where it is known less well than this do not count: what lies there by chance would
 turn it, by a long lever."""
-FIT_ROUNDS: Final = 3
-"""Fits of a new wall, each with the readings that the one before explains."""
 REPLACED_WEIGHT_MAX: Final = 12.0
 """A wall of less weight gives way to a new one where there are too many."""
 

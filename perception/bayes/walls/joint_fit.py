@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from perception.bayes.walls.corners import CORNER_ECHOES_MIN, CORNER_SYSTEMATIC_M, KEPT
 from perception.kernel import Floats
 from perception.records import Structured
+from perception.shared_numbers import OUTLIER_SIGMAS
 
-APART_SIGMAS: Final = 3.0
-"""A corner whose echoes place it farther from a wall's line, in σ, does not correct that wall."""
 PLACE_INFORMATION: Final = 1.0
 """Prior information on a corner's place, m⁻²: its echoes, if all of one bearing, leave it open across."""
 
@@ -114,7 +113,7 @@ def _agreeing(walls: Lines, points: Structured, all_: Incidences) -> Incidences:
     error += (rx * (yy * x - xy * y) + ry * (xx * y - xy * x)) / det
     spread = (rx * rx * yy - 2.0 * rx * ry * xy + ry * ry * xx) / det + CORNER_SYSTEMATIC_M**2
     spread += variance + 2.0 * all_.along * covariance + all_.along**2 * of_slope
-    agrees = np.abs(error) < APART_SIGMAS * np.sqrt(spread)
+    agrees = np.abs(error) < OUTLIER_SIGMAS * np.sqrt(spread)
     return Incidences(*(values[agrees] for values in (all_.points, all_.lines, all_.along, all_.rows, all_.levels)))
 
 

@@ -13,7 +13,6 @@ from typing import Final
 
 import numpy as np
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import Memory, StateRecord
@@ -30,7 +29,9 @@ from perception.bayes.memory.wall_records import (
 )
 from perception.bayes.walls.bins import HALF
 from perception.bayes.walls.contact import (
+    END_MARGIN_M,
     FIRM_WEIGHT,
+    FIT_ROUNDS,
     HEARD_REACH_M,
     SAME_SIGMAS,
     are_mirrors,
@@ -51,6 +52,7 @@ from perception.bayes.walls.corners import (
     find_corners,
 )
 from perception.kernel import Floats, kernel
+from perception.shared_numbers import FAR
 
 ECHOES_MIN: Final = 8
 """Remembered echoes, from afar, that show a corner; `EDGE_ECHOES_MIN` from near show an edge."""
@@ -62,18 +64,12 @@ LINE_CELL_M: Final = 0.05
 """Edge of a cell along a wall's line in which echoes of a point are counted."""
 EDGE_CUTS_MIN: Final = 2
 """Cuts in one cell for which an edge is looked for there."""
-PLACED_TIMES: Final = 3
-"""Times that a point is placed by its echoes, which are chosen by its place."""
-BEYOND_MIN_M: Final = 0.15
-"""The corner lies at least this far beyond the wall's end; nearer ones are found as the end itself."""
 INSIDE_M: Final = 0.25
 """What lies farther than this inside a span is no edge."""
 ACROSS_M: Final = 1.15
 """What lies farther than this beyond a span's end, across a doorway, is no edge of it."""
 SLANT_MIN: Final = 0.35
 """Least share of the range that runs along the wall: the wall's own echoes have none."""
-KNOWN_POINT_M: Final = 0.3
-"""Least distance from a corner or an edge that is known better."""
 APART_CELLS: Final = 3
 """Places that are looked at are so many cells apart."""
 TRIES_MAX: Final = 4
@@ -164,9 +160,9 @@ def enter_point_of_line(s: StateRecord, p: SettingsRecord, k: int, along: float,
         return False
     found = room.edges[free]
     spread = 0.0
-    for turn in range(PLACED_TIMES):
+    for turn in range(FIT_ROUNDS):
         spread = hear(room, wall, p, along, is_near, LINE_CELL_M if turn == 0 else 0.0, found)
-        if turn < PLACED_TIMES - 1:
+        if turn < FIT_ROUNDS - 1:
             step = step_along(found, wall)
             if math.isnan(step):
                 clear_corner(found)
@@ -304,14 +300,14 @@ def makes_room(room: WallMap, found: RoomCorner, is_near: bool) -> bool:
     """
     for c in range(CORNERS_MAX):
         corner = room.corners[c]
-        if corner.is_used == KEPT and math.hypot(corner.x - found.x, corner.y - found.y) < KNOWN_POINT_M:
+        if corner.is_used == KEPT and math.hypot(corner.x - found.x, corner.y - found.y) < EDGE_SAME_M:
             if corner.is_edge == found.is_edge and corner.echoes < found.echoes:
                 copy_heard(found, corner)
             return False
     for is_decided in (False, True):
         for c in range(EDGES_MAX):
             edge = room.edges[c]
-            if edge.is_used != KEPT or math.hypot(edge.x - found.x, edge.y - found.y) >= KNOWN_POINT_M:
+            if edge.is_used != KEPT or math.hypot(edge.x - found.x, edge.y - found.y) >= EDGE_SAME_M:
                 continue
             echoes = edge.echoes - edge.far_echoes if is_near else edge.echoes
             if is_decided:
@@ -342,7 +338,7 @@ def find_heard_points(memory: Memory, p: SettingsRecord, turn: int) -> None:
     cuts = cells[:, :-1] + cells[:, 1:]  # in places as wide as two cells, which overlap
     at = FIRST_M + LINE_CELL_M * np.arange(1.0, LINE_CELLS)
     beyond = np.maximum(low[0] - at, at - high[-1])
-    corners = np.where((beyond > BEYOND_MIN_M) & (beyond < HEARD_REACH_M), cuts.sum(axis=0), 0.0)
+    corners = np.where((beyond > END_MARGIN_M) & (beyond < HEARD_REACH_M), cuts.sum(axis=0), 0.0)
     within = np.minimum(at[:, None] - low, high - at[:, None]).max(axis=1)
     edges = np.where((within < INSIDE_M) & (within > -ACROSS_M), cuts[0], 0.0)
     is_new = False

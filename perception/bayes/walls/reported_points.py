@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from perception.bayes.walls.contact import EDGE_SIGMA_M
 from perception.bayes.walls.corners import ALONE_LEAD, CORNER_ECHOES_MIN, EDGE_ECHOES_MIN, EDGE_SAME_M
 from perception.bayes.walls.crossing import CORNER_BEYOND_M, CORNER_INSIDE_M
 from perception.bayes.walls.points import ECHOES_MIN
@@ -31,9 +32,6 @@ ALONE_EDGE_ECHOES: Final = 5.0
 ROUGH_LEAD: Final = 5.0
 """Where slanting walls answer, the echoes of such a point are more than so many times its passes: some of them may be
 a wall's."""
-ONE_WAY_SIGMA_M: Final = 0.1
-"""An edge that its own echoes place no better than this along some axis was heard from one direction: so the wall
-answers where it goes on."""
 ONE_WAY_NAT_MAX: Final = 1.0
 """Greatest log odds of such an edge. In the rooms of `bench standing` four of seven were true."""
 EVIDENCE_MAX_NAT: Final = 12.0
@@ -154,7 +152,7 @@ def end_at_edges(walls: dict[int, Straight], edges: Structured, are_mirrors: boo
 def is_one_way(heard: Structured) -> bool:
     """Return whether a point's echoes place it along one direction only; they are a record of `PointInformation`."""
     xx, xy, yy = (float(heard[name]) for name in ("xx", "xy", "yy"))
-    return 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy) < 1.0 / ONE_WAY_SIGMA_M**2
+    return 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy) < 1.0 / EDGE_SIGMA_M**2
 
 
 def _point(corner: Structured, signs: float) -> tuple[float, ...]:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.inference.reservoir import copy_reading
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.settings_record import SettingsRecord
@@ -43,6 +42,7 @@ from perception.bayes.walls.contact import (
 from perception.bayes.walls.evidence import SURE_SPAN_WEIGHT
 from perception.bayes.walls.fit import OFFSET_INFORMATION, SLOPE_SIGMA
 from perception.kernel import Floats, kernel
+from perception.shared_numbers import FAR
 
 RECENT_SPACING_M: Final = 0.08
 """Least distance between the recent readings of a sensor that nothing explains, and between the remembered ones."""

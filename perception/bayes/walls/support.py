@@ -14,6 +14,7 @@ from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.wall_records import IS_FREE, RecentReading, Wall, WallMap
 from perception.bayes.walls.contact import SAME_SIGMAS, SLANTING_MIN_COS, edges_answer
 from perception.kernel import kernel, loop_kernel
+from perception.shared_numbers import PASSED_M
 
 TOUCH_REACH_M: Final = 3.0
 """Readings that touch a candidate farther away than this do not count."""
@@ -26,8 +27,6 @@ SCORE_EDGE: Final = 0.6
 """Weight of an echo from the beam's edge."""
 SCORE_PASS: Final = 0.7
 """Weight of a range that passed through."""
-PASS_M: Final = 0.3
-"""A range this much longer than to a candidate passed through it."""
 PASS_WITHIN_M: Final = 0.5
 """A range that passed through counts where it touches the candidate this near the echo."""
 
@@ -85,7 +84,7 @@ def weigh(
         slack = SAME_SIGMAS * math.sqrt(variance_m2 + relative * expected * expected)
         slack += SCORE_LEVER * min(away, SCORE_LEVER_MAX_M) / base
         is_near = abs(e) < slack
-        passed = (e > PASS_M) & (away < PASS_WITHIN_M) & is_foot & (dot >= must)
+        passed = (e > PASSED_M) & (away < PASS_WITHIN_M) & is_foot & (dot >= must)
         for_it = near.is_free[j] * (1.0 if is_foot else SCORE_EDGE)
         against = SCORE_PASS if passed else 0.0
         weight = for_it if is_near else -against

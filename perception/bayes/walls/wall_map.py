@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.inference.reservoir import copy_reading
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
@@ -35,6 +34,7 @@ from perception.bayes.memory.wall_records import (
 from perception.bayes.walls.bins import PASSES_KEPT, SILENT_PASS, bin_of, enter_pass, enter_reading
 from perception.bayes.walls.contact import (
     BEAM_EDGE,
+    END_MARGIN_M,
     EXPLAINED_SIGMAS,
     FIRM_WEIGHT,
     FOOT,
@@ -55,16 +55,15 @@ from perception.bayes.walls.contact import (
     wall_point,
 )
 from perception.bayes.walls.corners import enter_echo, enter_looks, find_corners, point_of
-from perception.bayes.walls.fit import fit_walls
+from perception.bayes.walls.fit import GAP_MAX_M, fit_walls
 from perception.bayes.walls.initiation import try_wall
 from perception.bayes.walls.merging import drop_explained, merge_walls
 from perception.bayes.walls.noise import add_residual, estimate_noise
 from perception.bayes.walls.points import LONGER_SIGMAS, find_heard_points
 from perception.bayes.walls.review import RECENT_SPACING_M, remember, review
 from perception.kernel import kernel
+from perception.shared_numbers import FAR
 
-GROWTH_M: Final = 0.75
-"""A wall may continue this far beyond its spans."""
 KNOWN_SPACING_M: Final = 0.24
 """Least distance between the recent readings of a sensor that something explains; see `RECENT_SPACING_M`."""
 FIT_FIRINGS: Final = 2
@@ -75,8 +74,6 @@ REVIEW_FIRINGS: Final = 4
 """Firings between two reviews of a wall: a tenth of a millisecond each."""
 BEAM_WALL_WEIGHT_MIN: Final = 40.0
 """Walls of this weight show whether slanting walls answer from the beam's edge."""
-EDGE_WITHIN_M: Final = 0.15
-"""They show it only this far inside their ends."""
 THIN_M: Final = 0.2
 """Echoes of round objects thinner than this start no wall and extend none."""
 LOUD_SHARE: Final = 1.2
@@ -111,7 +108,7 @@ def weaken(room: WallMap, tracks: CircleTracks, q: Reading, own: int, p: Setting
         slack = tolerance(room, wall, along, expected, dot)
         if kind == BEAM_EDGE:
             is_free = own < 0 or k == own
-            if wall.weight > BEAM_WALL_WEIGHT_MIN and is_free and is_on_span(wall, along, -EDGE_WITHIN_M):
+            if wall.weight > BEAM_WALL_WEIGHT_MIN and is_free and is_on_span(wall, along, -END_MARGIN_M):
                 if abs(e) < slack:
                     room.edge_echoes += 1.0
                 elif e > slack + WENT_ON_M:
@@ -215,7 +212,7 @@ def explain(room: WallMap, q: Reading, p: SettingsRecord, is_known: bool) -> tup
     if own >= 0:
         return own, kind, False
     if not is_known:
-        own, kind, error = explaining_wall(room, q, p, GROWTH_M)
+        own, kind, error = explaining_wall(room, q, p, GAP_MAX_M)
     error_of_point = enter_point(room, q, p, error)
     is_point = error_of_point < 1.0
     if not is_point:

@@ -34,6 +34,7 @@ from perception.localization.drift.map_heading import ENTERED_AT_ONCE, MapHeadin
 from perception.localization.drift.slip import echoes_of_cycle, find_slip
 from perception.localization.localized_pose import LocalizedPose, Status
 from perception.sensor_mounts import mounts_array
+from perception.shared_numbers import FAR
 
 LOST_SHARE: Final = 0.25
 """With fewer than this the robot is lost."""
@@ -56,8 +57,6 @@ WAITING_MAX: Final = 240
 """Firings that can wait."""
 NOT_FIRED: Final = -1.0
 """What a waiting firing holds in place of NaN, for a sensor that did not fire: recordings hold numbers."""
-SILENT_M: Final = 1e6
-"""What a waiting firing holds in place of infinity, for silence."""
 CYCLE_FIRINGS: Final = 3
 """Firings from one check for a slip to the next one."""
 CYCLE_FIRINGS_MAX: Final = 24
@@ -159,7 +158,7 @@ class DriftCorrection:
             self._enter_next()
         row = self._waiting[self._arrived % WAITING_MAX]
         row[:POSE] = firing.pose.x, firing.pose.y, firing.pose.theta, firing.ring_yaw
-        row[POSE:] = np.nan_to_num(firing.ranges_m, nan=NOT_FIRED, posinf=SILENT_M, neginf=NOT_FIRED)
+        row[POSE:] = np.nan_to_num(firing.ranges_m, nan=NOT_FIRED, posinf=FAR, neginf=NOT_FIRED)
         if self._arrived > 0:
             before = self._waiting[(self._arrived - 1) % WAITING_MAX]
             way = math.hypot(row[0] - before[0], row[1] - before[1])

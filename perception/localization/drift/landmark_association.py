@@ -11,6 +11,7 @@ from typing import Final, TypeAlias
 from perception.kernel import Floats, kernel
 from perception.localization.drift.landmark_filter import innovation_variance, rows_used
 from perception.localization.drift.landmark_state import FIRST, EstimateRecord, SonarModel, X, Y
+from perception.shared_numbers import NO_INDEX
 
 GATE: Final = 10.8
 """χ² of one degree of freedom that a true reading exceeds in one of a thousand cases."""
@@ -20,8 +21,6 @@ MARGIN_RAD: Final = math.radians(1.0)
 MARGIN_SIGMAS: Final = 3.0
 """This far inside the beam a landmark must answer, and this far outside it may: a fixed part, and standard deviations
 of its bearing."""
-NO_LANDMARK: Final = -1
-"""In place of a landmark's number."""
 HIDING_RADII: Final = 1.1
 """A line of sight this near to a landmark's centre is hidden by it."""
 
@@ -118,7 +117,7 @@ def associate(
     Returns
     -------
     (int, float, bool)
-        The landmark in the beam whose predicted range is nearest in standard deviations, or `NO_LANDMARK`; the square
+        The landmark in the beam whose predicted range is nearest in standard deviations, or `NO_INDEX`; the square
         of that distance; whether another one explains the range, too.
     (int, float, bool)
         The landmark in the beam that is predicted nearest, its range (m), and whether it is surely in the beam.
@@ -126,7 +125,7 @@ def associate(
     x, y, ax, ay = beam
     est = e[0]
     n = rows_used(e)
-    best = second = first = NO_LANDMARK
+    best = second = first = NO_INDEX
     best_nis = second_nis = GATE
     nearest = math.inf
     is_expected = False
@@ -153,4 +152,4 @@ def associate(
             best, best_nis = i, nis
         elif nis < second_nis:
             second, second_nis = i, nis
-    return best, best_nis, second != NO_LANDMARK, first, nearest, is_expected
+    return best, best_nis, second != NO_INDEX, first, nearest, is_expected

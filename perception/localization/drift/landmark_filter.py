@@ -18,7 +18,6 @@ from perception.localization.drift.landmark_state import (
     OFFSET,
     RANGE,
     SCALE_MAX,
-    SCALE_MIN,
     TURN,
     EstimateRecord,
     X,
@@ -228,9 +227,9 @@ def correct(e: EstimateRecord, covariance: Floats, innovation: float, variance: 
     est.offset += factor * gain[OFFSET]
     est.offset_correction += factor * gain[OFFSET]
     est.heading_correction += factor * gain[HEADING]
-    est.odometer_scale = min(SCALE_MAX, max(SCALE_MIN, est.odometer_scale + factor * gain[ODOMETER]))
+    est.odometer_scale = min(SCALE_MAX, max(1.0 / SCALE_MAX, est.odometer_scale + factor * gain[ODOMETER]))
     est.turn_scale += factor * gain[TURN]
-    est.range_scale = min(SCALE_MAX, max(SCALE_MIN, est.range_scale + factor * gain[RANGE]))
+    est.range_scale = min(SCALE_MAX, max(1.0 / SCALE_MAX, est.range_scale + factor * gain[RANGE]))
     turn = factor * gain[HEADING]
     move_points(e, turn, gain, factor)
     est.heading += turn

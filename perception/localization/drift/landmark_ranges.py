@@ -11,7 +11,6 @@ from typing import Final
 
 from perception.kernel import Floats, kernel
 from perception.localization.drift.landmark_association import (
-    NO_LANDMARK,
     associate,
     bearing_variance,
     is_landmark_hidden,
@@ -27,16 +26,15 @@ from perception.localization.drift.landmark_state import (
     SonarModel,
 )
 from perception.sensor_mounts import RingPose, SensorPose
+from perception.shared_numbers import NO_INDEX, PASSED_M, SPACING_M
 
 SOFT: Final = 6.25
 """Normalised squared innovation from which on a reading's weight is reduced: its tails are heavier than a bell's."""
 NEAR_M: Final = 0.5
 """A range this near to a landmark's, but outside the gate, is a failure of that landmark."""
-FRESH_M: Final = 0.02
-"""A sensor's readings from poses nearer than this, and turned by less than `FRESH_RAD`, repeat one error of rounding;
-only the first is used."""
 FRESH_RAD: Final = math.radians(1.0)
-"""Turn in `FRESH_M`."""
+"""A sensor's readings from poses nearer than `SPACING_M`, and turned by less than this, repeat one error of rounding;
+only the first is used."""
 NOISE_MEMORY: Final = 0.005
 """Share of one reading in the estimate of the noise."""
 NOISE_MIN: Final = 0.02
@@ -62,14 +60,12 @@ WILD_PER_M: Final = 0.01
 """Share of the readings that are of something else, for each metre of range: as many fit a landmark by chance."""
 CURVATURE_MIN: Final = 1e-6
 """With less, as a share of the squared slope, nothing would change."""
-PASSED_M: Final = 0.3
-"""A range this much beyond a landmark's has passed it."""
 
 
 @kernel
 def has_moved_since(last: LastUse, x: float, y: float, axis: float) -> bool:
     """Return whether a sensor at (x, y) (m), axis (rad), has moved or turned enough since its last reading."""
-    return last.is_known == 0 or abs(axis - last.axis) >= FRESH_RAD or math.hypot(x - last.x, y - last.y) >= FRESH_M
+    return last.is_known == 0 or abs(axis - last.axis) >= FRESH_RAD or math.hypot(x - last.x, y - last.y) >= SPACING_M
 
 
 @kernel
@@ -237,7 +233,7 @@ def update_with_range(
     r: float,
     sonar: SonarModel,
 ) -> int:
-    """Enter the range of one sensor; return the landmark that it is from, or `NO_LANDMARK`.
+    """Enter the range of one sensor; return the landmark that it is from, or `NO_INDEX`.
 
     The reading is from the landmark in the beam whose predicted range is nearest in standard deviations. Where two
     explain it, it is not used. A range that passed a landmark which should have answered moves that out of the beam;
@@ -265,19 +261,19 @@ def update_with_range(
     best, best_nis, is_ambiguous, first, nearest, is_expected = associate(e, covariance, (x, y, ax, ay), r, sonar)
     if (
         is_expected
-        and best == NO_LANDMARK
+        and best == NO_INDEX
         and (r < nearest - NEAR_M or may_answer_instead(e, first, x, y, ax, ay, half_angle, r))
     ):
         is_expected = False
     if is_expected:
-        est.fit_share += FIT_MEMORY * ((1.0 if best != NO_LANDMARK else 0.0) - est.fit_share)
-    is_missed = first != NO_LANDMARK and first != best and r > nearest + PASSED_M and nearest < sonar.range_max
+        est.fit_share += FIT_MEMORY * ((1.0 if best != NO_INDEX else 0.0) - est.fit_share)
+    is_missed = first != NO_INDEX and first != best and r > nearest + PASSED_M and nearest < sonar.range_max
     if is_missed and not is_landmark_hidden(e, first, x, y):
         update_with_edge(e, covariance, first, mx, my, axis, half_angle, NO_RANGE)
-    elif best == NO_LANDMARK and is_expected and abs(r - nearest) <= NEAR_M:
+    elif best == NO_INDEX and is_expected and abs(r - nearest) <= NEAR_M:
         est.landmarks[first].failures += 1
-    if best == NO_LANDMARK or is_ambiguous:
-        return NO_LANDMARK
+    if best == NO_INDEX or is_ambiguous:
+        return NO_INDEX
     correct_with_range(e, covariance, best, best_nis, mount, r, sonar)
     return best
 
@@ -315,6 +311,6 @@ def update_with_firing(
             continue
         if r >= sonar.range_max:
             r = math.inf
-        if update_with_range(e, covariance, (mx, my, axis), r, sonar) != NO_LANDMARK:
+        if update_with_range(e, covariance, (mx, my, axis), r, sonar) != NO_INDEX:
             used += 1
     return used

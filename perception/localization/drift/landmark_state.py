@@ -22,15 +22,12 @@ STRAY_MIN: Final = 5e-4
 """Least value of `Estimate.stray`."""
 STRAY_MAX: Final = 0.9
 """Greatest value of `Estimate.stray`."""
-SCALE_MIN: Final = 0.5
-"""Least scale of odometer and ranges, by which something is divided: those of a real robot are near 1."""
 SCALE_MAX: Final = 2.0
-"""Greatest scale of odometer and ranges."""
+"""Greatest scale of odometer and ranges; its inverse is the least, by which something is divided: those of a real
+robot are near 1."""
 
-HEADING, X, Y, OFFSET, ODOMETER, TURN, RANGE = range(7)
-"""Rows of the covariance for the fields of `Estimate`, in their order; those of the landmarks follow."""
-FIRST: Final = 7
-"""Row of the first landmark's x."""
+HEADING, X, Y, OFFSET, ODOMETER, TURN, RANGE, FIRST = range(8)
+"""Rows of the covariance for the fields of `Estimate`, in their order, and the row of the first landmark's x."""
 ROWS_MAX: Final = FIRST + 2 * LANDMARKS_MAX
 """Rows of the state: that of the robot, and the place of each landmark."""
 
@@ -86,11 +83,11 @@ class Estimate(Record):
     y: Place
     offset: Place
     """True less reported angle from the ring's direction to the direction of travel."""
-    odometer_scale: Annotated[float, Bound(SCALE_MIN, SCALE_MAX)]
+    odometer_scale: Annotated[float, Bound(1.0 / SCALE_MAX, SCALE_MAX)]
     """Reported distance over true distance."""
     turn_scale: Place
     """True turn over reported turn, less 1."""
-    range_scale: Annotated[float, Bound(SCALE_MIN, SCALE_MAX)]
+    range_scale: Annotated[float, Bound(1.0 / SCALE_MAX, SCALE_MAX)]
     """Reported range over true range."""
     count: Annotated[int, up_to(LANDMARKS_MAX)]
     """Landmarks."""

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from drivers.messages import Pose, wrap_angle
-from perception.angles import ROUNDING_RAD
 from perception.bounds import CONSTANT, COUNT, FINITE, PLACE, bounds
 from perception.kernel import Floats
 from perception.localization.drift.landmark_filter import propagate, rows_used, write_lever
@@ -30,10 +29,9 @@ from perception.localization.drift.landmark_state import (
 from perception.localization.drift.walk_rates import WalkRates
 from perception.records import records, zeros
 from perception.sensor_mounts import RingPose, mounts_array, turned_mounts
+from perception.shared_numbers import ODOMETER_SIGMA, ROUNDING
 
 OFFSET_SIGMA_RAD: Final = math.radians(0.5)
-ODOMETER_SIGMA: Final = 0.03
-"""Standard deviation of the odometer's scale at the start."""
 TURN_SIGMA: Final = 0.01
 """Standard deviation of the scale of turns, and of that of ranges, at the start."""
 HEADING_RATES: Final = (math.radians(0.1) * 2.0 ** (0.5 * np.arange(12.0))) ** 2
@@ -234,7 +232,7 @@ class LandmarkTracker:
         c, s = math.cos(theta_before), math.sin(theta_before)
         dx, dy = x - x_before, y - y_before
         ring_turn, travel_turn = wrap_angle(yaw - yaw_before), wrap_angle(theta - theta_before)  # a log may wrap them
-        self.is_synchro = self.is_synchro or abs(wrap_angle(travel_turn - ring_turn)) > ROUNDING_RAD
+        self.is_synchro = self.is_synchro or abs(wrap_angle(travel_turn - ring_turn)) > ROUNDING
         way = math.hypot(dx, dy)
         self._renew_walk(way)
         turn_variance, place_variance = self._rates.rate * way, DRIFT_PLACE_WALK * way

@@ -9,11 +9,10 @@ import numpy as np
 from perception.kernel import Floats
 from perception.localization.room.expected_ranges import Beams, crossed
 from perception.localization.room.room import Room
+from perception.shared_numbers import PASSED_M
 
 BEAM_RAYS: Final = 5
 """Rays across a beam. The echo may come from anywhere in the beam, so that one free ray is enough."""
-BEHIND_WALL_M: Final = 0.3
-"""A ray may end this far behind a wall, m."""
 
 
 def blocked_share(room: Room, beams: Beams, measured: Floats, half_angle: float) -> Floats:
@@ -40,6 +39,6 @@ def blocked_share(room: Room, beams: Beams, measured: Floats, half_angle: float)
     blocked = np.ones(x.shape, dtype=np.bool_)
     for off in np.linspace(-half_angle, half_angle, BEAM_RAYS):
         to_x, to_y = x + measured[heard] * np.cos(axis + off), y + measured[heard] * np.sin(axis + off)
-        hit = crossed(room, x.reshape(-1), y.reshape(-1), to_x.reshape(-1), to_y.reshape(-1), BEHIND_WALL_M)
+        hit = crossed(room, x.reshape(-1), y.reshape(-1), to_x.reshape(-1), to_y.reshape(-1), PASSED_M)
         blocked &= hit.reshape(x.shape)
     return np.asarray(blocked.mean(axis=1))

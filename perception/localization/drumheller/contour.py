@@ -19,11 +19,8 @@ from perception.kernel import Floats
 from perception.localization.drumheller.panorama import Panorama
 from perception.localization.room.expected_ranges import Reflection
 from perception.localization.room.range_likelihood import RangeModel
+from perception.shared_numbers import BESIDE_MAX_RAD, NORMAL_DIRECTIONS
 
-TRIED_DIRECTIONS: Final = 360
-"""Directions of normals that are tried."""
-SLANT_MAX_RAD: Final = math.radians(60.0)
-"""Largest angle between a wall's normal and a beam's edge at which an echo still counts as the wall's (`cone`)."""
 TOLERANCE_SIGMAS: Final = 2.5
 """Half the width of a range's interval in standard deviations."""
 
@@ -66,13 +63,13 @@ def contour_segments(
     """
     heard = np.flatnonzero(np.isfinite(panorama.range_m))
     r, axis = panorama.range_m[heard], panorama.axis[heard]
-    alpha = 2.0 * math.pi / TRIED_DIRECTIONS * np.arange(TRIED_DIRECTIONS)
+    alpha = 2.0 * math.pi / NORMAL_DIRECTIONS * np.arange(NORMAL_DIRECTIONS)
     off = (alpha - axis[:, None] + math.pi) % (2.0 * math.pi) - math.pi
     slant = np.maximum(np.abs(off) - half_angle, 0.0)
     offset = r[:, None] * np.cos(slant)
     offset += np.cos(alpha) * panorama.x[heard][:, None] + np.sin(alpha) * panorama.y[heard][:, None]
     slack = TOLERANCE_SIGMAS * model.sigma(r)[:, None]
-    offset[slant > (SLANT_MAX_RAD if reflection == "cone" else 0.0)] = np.nan
+    offset[slant > (BESIDE_MAX_RAD if reflection == "cone" else 0.0)] = np.nan
     low, high = offset - slack, offset + slack
 
     runs: list[list[int]] = []
@@ -94,7 +91,7 @@ def contour_segments(
             ContourSegment(
                 len(run),
                 middle,
-                float(np.abs(spread).max()) + 2.0 * math.pi / TRIED_DIRECTIONS,
+                float(np.abs(spread).max()) + 2.0 * math.pi / NORMAL_DIRECTIONS,
                 0.5 * float(lo[best] + hi[best]),
                 0.5 * float(hi[best] - lo[best]),
                 float(x.mean()),

@@ -27,6 +27,7 @@ from perception.localization.drumheller.pose_fit import Stand, beams_at, fit_pos
 from perception.localization.room.expected_ranges import Reflection
 from perception.localization.room.range_likelihood import RangeModel, log_ratio_of_true_pose
 from perception.localization.room.room import Room
+from perception.shared_numbers import EVEN
 
 SEGMENTS_MAX: Final = 8
 """Segments of a panorama that enter the tree. The paper takes the longest 3 or 4; on mirrors many are corners."""
@@ -57,8 +58,6 @@ SAME_POSE_RAD: Final = math.radians(7.0)
 """Difference of headings in `SAME_POSE_M`."""
 LOST_SIGMAS: Final = 2.0
 """A pose that the search has missed is given a true pose's likelihood, so many standard deviations below its mean."""
-LOST_PROBABILITY: Final = 0.5
-"""The robot is lost where it is more likely than this that the search has missed its pose."""
 HEADING_CELL_RAD: Final = math.radians(4.0)
 """Headings of a place that differ by more are candidates of their own: between the moments at which a turn moves an
 echo into a beam or out of one, the ranges hardly depend on it."""
@@ -129,7 +128,7 @@ def localize(
         return ()
     missed = modes[0].log_evidence - modes[0].log_ratio + mean - LOST_SIGMAS * sigma
     total = float(np.logaddexp.reduce([missed, *(mode.log_evidence for mode in modes)]))
-    if math.exp(missed - total) > LOST_PROBABILITY:
+    if math.exp(missed - total) > EVEN:
         return ()
     found = [
         one for mode in modes for one in _candidates(mode, total) if one.probability >= CANDIDATE_PROBABILITY_MIN

@@ -14,11 +14,8 @@ from drivers.messages import Firing, Pose, wrap_angle
 from perception.bounds import COUNT, FINITE, PLACE, bounds, up_to
 from perception.kernel import Floats
 from perception.localization.known_room.particle_update import COLUMNS
+from perception.shared_numbers import READING_M, READING_RAD
 
-KEYFRAME_M: Final = 0.1
-"""A keyframe ends after this way."""
-KEYFRAME_RAD: Final = math.radians(6.0)
-"""A keyframe ends after this turn."""
 STAND_M: Final = 0.01
 """A robot that moves less than this, and turns less than `STAND_RAD`, while the ring fires as often as it has sensors
 stands: that is a keyframe."""
@@ -95,7 +92,7 @@ class Keyframes:
             self._begin[:] = x, y, yaw
         begin_x, begin_y, begin_yaw = self._begin.tolist()
         way, turn = math.hypot(x - begin_x, y - begin_y), abs(wrap_angle(yaw - begin_yaw))
-        has_moved = way >= KEYFRAME_M or turn >= KEYFRAME_RAD
+        has_moved = way >= READING_M or turn >= READING_RAD
         stands = way < STAND_M and turn < STAND_RAD and self._firings >= len(self._axes) and not self._has_stood
         if has_moved or stands:
             self._has_stood = stands

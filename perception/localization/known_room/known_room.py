@@ -26,7 +26,7 @@ from perception.localization.known_room.pose_particles import HYPOTHESES_MAX, ME
 from perception.localization.known_room.pose_track import LEAST_LOG, SEARCH_LEAST_LOG, PoseTrack, heading_noise
 from perception.localization.known_room.surroundings import make_surroundings
 from perception.localization.localized_pose import LocalizedPose, Status
-from perception.localization.room.range_likelihood import RangeModel
+from perception.localization.room.range_likelihood import OUTLIERS, RangeModel
 from perception.localization.room.room import Room
 from perception.sensor_mounts import mounts_array
 
@@ -34,8 +34,6 @@ MAP_NOISE_M: Final = 0.03
 """Noise of a range compared with the map, whose own errors it contains."""
 DROPOUT: Final = 0.15
 """Share of the expected echoes that are missed."""
-OUTLIERS: Final = 0.1
-"""Share of the readings that are of something else than the map."""
 WINDOW_M: Final = 9.0
 """Way over which odometry compounds keyframes for a search."""
 WINDOW_LEAST: Final = 9

@@ -24,6 +24,7 @@ from perception.localization.known_room.surroundings import Surroundings, expect
 from perception.localization.room.range_likelihood import HEARD_PRIOR
 from perception.localization.room.room import Room
 from perception.records import Record, Records, records, zeros
+from perception.shared_numbers import NO_INDEX
 
 GRID_CELL_M: Final = 0.2
 """Edge of a cell of the grid of places."""
@@ -59,8 +60,6 @@ START_LOG: Final = 40.0
 """A start less likely than the best one by more than this, nat, is not the place."""
 COMPLETE_LOG: Final = 20.0
 """Where the worst of so many starts is less likely than the best by this, nat, the place is among them."""
-NO_CELL: Final = -1
-"""In place of the number of a search's quantum where none runs."""
 
 Bytes = NDArray[np.uint8]
 
@@ -229,7 +228,7 @@ class PoseGrid:
         _searches=COUNT,
         _profiles=Bound(1, PROFILES_MAX),
         _shares=SHARE,
-        _quantum=Bound(NO_CELL, COUNT.high),
+        _quantum=Bound(NO_INDEX, COUNT.high),
     )
 
     def __init__(self, room: Room, surroundings: Surroundings, clear_m: float) -> None:
@@ -254,7 +253,7 @@ class PoseGrid:
         self._count = self._searches = 0
         self._profiles = 1
         self._shares = np.zeros((PROFILES_MAX, 3))
-        self._quantum = NO_CELL
+        self._quantum = NO_INDEX
         self._likely = np.zeros((PROFILES_MAX, GRID_READINGS_MAX, 3, SILENT_CODE + 1))
         self._likely_search = 0
         """Number of the search that the likelihoods are of."""
@@ -262,7 +261,7 @@ class PoseGrid:
     @property
     def is_searching(self) -> bool:
         """Whether a search has work left."""
-        return self._quantum != NO_CELL
+        return self._quantum != NO_INDEX
 
     def begin(self, readings: Floats, profiles: Floats) -> None:
         """Begin a search.
@@ -285,7 +284,7 @@ class PoseGrid:
 
     def cancel(self) -> None:
         """End a search without an answer."""
-        self._quantum = NO_CELL
+        self._quantum = NO_INDEX
 
     def refine(self) -> None:
         """Do one quantum of a search: part of the table if it is not complete, otherwise a block at one heading."""
@@ -311,7 +310,7 @@ class PoseGrid:
         offer_peaks(self.starts, self._scratch, x, y, direction * GRID_STEP_RAD, profile)
         self._quantum += 1
         if self._quantum >= self._profiles * GRID_DIRECTIONS * blocks_i * blocks_j:
-            self._quantum = NO_CELL
+            self._quantum = NO_INDEX
 
     def best_starts(self, most: int) -> Floats:
         """Return the poses that fit best, the best first, without those that fit much worse.

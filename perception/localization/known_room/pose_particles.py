@@ -17,13 +17,12 @@ from perception.bounds import Finite, Place, Share, up_to
 from perception.kernel import Floats, Ints, kernel
 from perception.localization.known_room.surroundings import insert_nearest
 from perception.records import Record, Records
+from perception.shared_numbers import ODOMETER_SIGMA
 
 HEADINGS: Final = 25
 """Particles of a hypothesis."""
 HYPOTHESES_MAX: Final = 100
 """Hypotheses of the place at a time: the best starts of a search."""
-SCALE_SIGMA: Final = 0.03
-"""Standard deviation of the odometer's scale at the start."""
 PLACE_WALK: Final = 0.02**2
 """Variance of a displacement by odometry on each axis, m²/m."""
 SCALE_WALK: Final = 0.002**2
@@ -154,7 +153,7 @@ def add_hypothesis(
         p.heading = heading + heading_half_rad * (2.0 * i / (HEADINGS - 1) - 1.0)
         p.x, p.y, p.scale = x, y, 1.0
         p.xx, p.xy, p.xs = place_sigma_m * place_sigma_m, 0.0, 0.0
-        p.yy, p.ys, p.ss = place_sigma_m * place_sigma_m, 0.0, SCALE_SIGMA * SCALE_SIGMA
+        p.yy, p.ys, p.ss = place_sigma_m * place_sigma_m, 0.0, ODOMETER_SIGMA * ODOMETER_SIGMA
         p.log_weight, p.log_ratio = -math.log(HEADINGS), 0.0
         p.specular = p.turned_away = p.late = p.wild = p.beside = p.could_beside = 0.0
     of[0].count = count + 1

@@ -13,6 +13,8 @@ from perception.kernel import Floats
 
 HEARD_PRIOR: Final = 0.5
 """Share of the sensors that hear something, at a place of which nothing is known."""
+OUTLIERS: Final = 0.1
+"""Share of the readings that are of something else than the map."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from perception.kernel import Floats, kernel
+from perception.shared_numbers import LEAST_READINGS, OUTLIER, SILENCE_M
 
 SUBMAP_CELL_M: Final = 0.1
 """Edge of a map's cell."""
@@ -23,19 +24,13 @@ SUBMAP_CELLS: Final = 140
 HALF_CELLS: Final = SUBMAP_CELLS // 2
 """Cells from a map's middle to its edge."""
 ECHO_MAX_M: Final = 4.9
-"""Echoes from farther count as silence, whose cone is clear up to `SILENT_CLEAR_M` only: mirrors are silent, too."""
-SILENT_CLEAR_M: Final = 2.5
-"""Way that silence shows to be clear; see `ECHO_MAX_M`."""
+"""Echoes from farther count as silence, whose cone is clear up to `SILENCE_M` only: mirrors are silent, too."""
 SHARING_ROUNDS: Final = 6
 """Rounds of expectation maximisation."""
 PASS_RAYS: Final = 21
 """Rays of a beam along which a range is entered as passed: 0.1 m apart at 5 m and ±12°."""
-ELSEWHERE: Final = 0.005
-"""Weight of an echo's origin outside its arc, among cells that answer with probabilities up to 1."""
 PRIOR_HITS: Final = 0.015
 """Hits of a cell that was not looked at: it answers with 3 %."""
-PRIOR_LOOKS: Final = 0.5
-"""Readings of a cell that was not looked at, passes and hits together."""
 THICKNESS: Final = 3.0
 """A surface is about three cells thick once it is blurred, which divide each echo among them."""
 CHUNK: Final = 64
@@ -77,7 +72,7 @@ def enter_passes(readings: Floats, begin: int, end: int, half: float, passes: Fl
     """
     for k in range(begin, end):
         x, y, axis, range_m = readings[k]
-        clear = range_m - SUBMAP_CELL_M if range_m <= ECHO_MAX_M else SILENT_CLEAR_M
+        clear = range_m - SUBMAP_CELL_M if range_m <= ECHO_MAX_M else SILENCE_M
         for ray in range(PASS_RAYS):
             t = 2.0 * (ray + 0.5) / PASS_RAYS - 1.0
             c, s = math.cos(axis + t * half), math.sin(axis + t * half)
@@ -115,7 +110,7 @@ def share_echoes(readings: Floats, count: int, half: float, passes: Floats, hits
         if range_m > ECHO_MAX_M:
             continue
         places = max(3, int(4.0 * half * range_m / SUBMAP_CELL_M) + 1)
-        total = ELSEWHERE
+        total = OUTLIER
         for enters in range(2):
             for place in range(places):
                 t = 2.0 * (place + 0.5) / places - 1.0
@@ -137,7 +132,7 @@ def share_echoes(readings: Floats, count: int, half: float, passes: Floats, hits
 @kernel
 def _answer(hits: float, passes: float) -> float:
     """Return the probability that a cell answers."""
-    return (THICKNESS * hits + PRIOR_HITS) / (THICKNESS * hits + passes + PRIOR_LOOKS)
+    return (THICKNESS * hits + PRIOR_HITS) / (THICKNESS * hits + passes + LEAST_READINGS)
 
 
 @kernel

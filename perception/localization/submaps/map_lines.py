@@ -14,9 +14,10 @@ from typing import Final
 
 import numpy as np
 
-from perception.angles import ROUNDING_RAD, wrapped
+from perception.angles import wrapped
 from perception.kernel import Floats, kernel
 from perception.localization.submaps.local_grid import ECHO_MAX_M, HALF_CELLS, SUBMAP_CELL_M
+from perception.shared_numbers import ROUNDING
 
 NORMALS: Final = 120
 """Directions of a normal that are voted for."""
@@ -78,7 +79,7 @@ def vote(readings: Floats, begin: int, end: int, half: float, taken: Floats, vot
             direction = number * NORMAL_STEP_RAD
             if abs(direction - axis) > GRAZING_RAD:
                 continue
-            beside = max(0.0, abs(direction - axis) - half - ROUNDING_RAD)
+            beside = max(0.0, abs(direction - axis) - half - ROUNDING)
             distance = math.cos(direction) * x + math.sin(direction) * y + range_m * math.cos(beside)
             j = math.floor(distance / DISTANCE_STEP_M) + DISTANCES // 2
             if 0 <= j < DISTANCES:
@@ -158,7 +159,7 @@ def _fit(readings: Floats, count: int, half: float, taken: Floats, line: Floats)
             return 0
         line[4] = math.sqrt(error2 / number)
         turn = (d * u - b * v) / determinant
-        share = min(1.0, NORMAL_STEP_RAD / max(abs(turn), ROUNDING_RAD))
+        share = min(1.0, NORMAL_STEP_RAD / max(abs(turn), ROUNDING))
         line[0] += share * turn
         line[1] += share * (a * v - b * u) / determinant
     return number

@@ -14,21 +14,15 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from perception.kernel import Floats, kernel
-from perception.localization.submaps.local_grid import (
-    ECHO_MAX_M,
-    HALF_CELLS,
-    SILENT_CLEAR_M,
-    SUBMAP_CELL_M,
-    SUBMAP_CELLS,
-)
+from perception.localization.room.range_likelihood import OUTLIERS
+from perception.localization.submaps.local_grid import ECHO_MAX_M, HALF_CELLS, SUBMAP_CELL_M, SUBMAP_CELLS
+from perception.shared_numbers import SILENCE_M
 
 MATCH_RAYS: Final = 7
 """Rays of a beam along which the map is asked."""
 ANSWERS: Final = 0.2
 """Share of a cell's probability with which one ray is answered. With more, beams end before the surface: drives with
 known poses were matched 5 cm short with 0.6, without a bias with 0.2, where their readings also are likeliest."""
-MATCH_OUTLIERS: Final = 0.1
-"""Share of the readings that come from nothing in the map."""
 MATCH_NOISE_M: Final = 0.08
 """Noise of a range in cells of 0.1 m."""
 BEAM_CELLS: Final = 50
@@ -101,7 +95,7 @@ def fit_of(
         axis = at[2] + readings[k, 2]
         is_silent = range_m > ECHO_MAX_M
         last = BEAM_CELLS if is_silent else min(BEAM_CELLS, int(range_m / SUBMAP_CELL_M) + 3)
-        end = int((SILENT_CLEAR_M if is_silent else range_m) / SUBMAP_CELL_M)
+        end = int((SILENCE_M if is_silent else range_m) / SUBMAP_CELL_M)
         known = 0.0
         for n in range(last):
             goes_on[n] = 1.0
@@ -128,11 +122,11 @@ def fit_of(
                 density += passes * (1.0 - goes_on[n]) * math.exp(-0.5 * (off / MATCH_NOISE_M) ** 2)
             passes *= goes_on[n]
         if is_silent:
-            likelihood = (1.0 - MATCH_OUTLIERS) * passes + 0.5 * MATCH_OUTLIERS
+            likelihood = (1.0 - OUTLIERS) * passes + 0.5 * OUTLIERS
         else:
-            likelihood = (1.0 - MATCH_OUTLIERS) * density / (
+            likelihood = (1.0 - OUTLIERS) * density / (
                 MATCH_NOISE_M * math.sqrt(2.0 * math.pi)
-            ) + MATCH_OUTLIERS / ECHO_MAX_M
+            ) + OUTLIERS / ECHO_MAX_M
         total += known * (math.log(likelihood) - usual)
         weight += known
     fit[0], fit[1] = step * total, step * weight

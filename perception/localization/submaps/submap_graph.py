@@ -26,8 +26,6 @@ from perception.localization.submaps.map_job import RUN_MAX, Maps, Outcome, matc
 from perception.localization.submaps.pose_graph import OF_OTHER, SCALES, Link, Node
 from perception.localization.submaps.submap_records import (
     PATH_PLACES,
-    READING_M,
-    READING_RAD,
     SUBMAP_M,
     SUBMAP_RAD,
     SUBMAP_READINGS_MAX,
@@ -46,6 +44,7 @@ from perception.localization.submaps.submap_records import (
 from perception.map_moves import MapMoves
 from perception.records import zeros
 from perception.sensor_mounts import mounts_array, mounts_at
+from perception.shared_numbers import READING_M, READING_RAD
 
 WALK_RAD: Final = 0.02
 """Random walk of odometry's heading beside the scales, rad/√m."""

@@ -13,6 +13,7 @@ from perception.bounds import PLACE, Finite, bounds, up_to
 from perception.kernel import Floats
 from perception.localization.submaps.pose_graph import OF_ODOMETRY, OF_OTHER, Link, Node, spread_from
 from perception.records import Record, Structured, records, zeros
+from perception.shared_numbers import READING_M, READING_RAD
 
 LOST_WAY: Final = (0.02, 0.01)
 """Share of its way that a match with the map before, and one with another, usually loses. Four real drives, two
@@ -21,10 +22,6 @@ SUBMAP_M: Final = 3.0
 """A map ends after this way."""
 SUBMAP_RAD: Final = 2.0
 """A map ends after these turns: scales of 3 % deform it by one cell."""
-READING_M: Final = 0.1
-"""Readings of one sensor from poses nearer than this, in heading than `READING_RAD`, have the same error."""
-READING_RAD: Final = math.radians(6.0)
-"""Difference of headings in `READING_M`."""
 SUBMAP_READINGS_MAX: Final = 512
 """Of one map, which ends with them."""
 PATH_PLACES: Final = 10

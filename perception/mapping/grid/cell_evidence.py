@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from perception.kernel import Floats, Ints, kernel
 from perception.mapping.grid.window import OCTANTS, octant
+from perception.shared_numbers import NO_NUMBER
 
 UNDIRECTED_UNIT: Final = 2.0
 """An echo's unit of evidence in the undirected evidence."""
@@ -28,10 +29,6 @@ PLACE_NUMBERS: Final = 1 << 15
 """Places are numbered modulo this."""
 CERTAIN: Final = 3 * NAT
 """Greatest evidence for and against, so that contradiction is soon seen."""
-NO_PLACE_NUMBER: Final = 0
-"""The place of evidence that was never renewed; no place has this number."""
-BEYOND_M: Final = 0.3
-"""An echo from this far behind what should have answered passed over it."""
 SURE: Final = NAT // 2
 """A cell of so much evidence answers."""
 FAINT: Final = int(0.1 * NAT)
@@ -176,7 +173,7 @@ def fill_probability(
             ix = int(corner[0]) + column
             jx = ix & mask
             both = planes[UNDIRECTED, jy, jx]
-            if both[STAMP] == NO_PLACE_NUMBER:
+            if both[STAMP] == NO_NUMBER:
                 out[row, column] = odds[CERTAIN]
                 continue
             if math.isnan(from_x):
@@ -184,7 +181,7 @@ def fill_probability(
                 least = 0
                 for k in range(OCTANTS if mirrors > 0.0 else 0):
                     kept = planes[k, jy, jx]
-                    if kept[STAMP] != NO_PLACE_NUMBER:
+                    if kept[STAMP] != NO_NUMBER:
                         value = evidence_now(kept, place)
                         most = max(most, value)
                         least = min(least, value)

@@ -27,7 +27,6 @@ from drivers.messages import Firing
 from perception.bounds import Bound, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
 from perception.mapping.grid.cell_evidence import (
-    BEYOND_M,
     CERTAIN,
     NAT,
     PASSAGE,
@@ -42,6 +41,7 @@ from perception.mapping.grid.cell_evidence import (
     make_draws,
     renew,
 )
+from perception.mapping.grid.elfes import ARC_SIGMAS
 from perception.mapping.grid.window import (
     OCTANTS,
     SPREAD_CELLS,
@@ -56,11 +56,10 @@ from perception.mapping.grid.window import (
     rows_within,
     set_edges,
 )
+from perception.shared_numbers import PASSED_M
 
 DIRECTED_ARC_SIGMAS: Final = 1.5
 """Half the thickness of an echo's arc in a looking direction."""
-UNDIRECTED_ARC_SIGMAS: Final = 2.0
-"""Half the thickness of an echo's arc in the undirected evidence."""
 PASSED: Final = 1.2 * NAT
 """Evidence of a passage through the middle of a beam; towards the edge it vanishes."""
 SILENT_NAT: Final = 1.8 * NAT
@@ -150,7 +149,7 @@ def sweep_beam(
     nearest = math.inf
     # Cells so near are passed, and in no arc: what is done there needs no root of the square of the distance.
     square_sine = math.sin(half_angle) ** 2
-    deep = 0.999 * max(0.0, min(passed, end - 2.0 * UNDIRECTED_ARC_SIGMAS * sigma)) ** 2
+    deep = 0.999 * max(0.0, min(passed, end - 2.0 * ARC_SIGMAS * sigma)) ** 2
     one = octant(edges[0], edges[1])
     other = octant(edges[2], edges[3])
     low_y, high_y = rows_within(raster, sy, end, mask)
@@ -169,7 +168,7 @@ def sweep_beam(
             jx = ix & mask
             if square >= deep or maybe_sure[jy, jx]:
                 d = math.sqrt(square)
-                if has_arc and abs(d - r) <= UNDIRECTED_ARC_SIGMAS * sigma and m < arc.shape[0]:
+                if has_arc and abs(d - r) <= ARC_SIGMAS * sigma and m < arc.shape[0]:
                     arc[m, 0] = jy
                     arc[m, 1] = jx
                     arc[m, 2] = k if abs(d - r) <= DIRECTED_ARC_SIGMAS * sigma else UNDIRECTED
@@ -242,7 +241,7 @@ def enter_readings(
         set_edges(axis, half_angle, edges)
         sigma = max(SPREAD_CELLS * cell_m, rounding_m, SPREAD_RELATIVE * r) if is_echo else 0.0
         passed = r - sigma if is_echo else silence_m
-        end = r + UNDIRECTED_ARC_SIGMAS * sigma if is_echo else silence_m
+        end = r + ARC_SIGMAS * sigma if is_echo else silence_m
         is_located = is_echo and not math.isnan(bearings[i])
         has_arc = is_echo and not is_located
         weight = PASSED * (1.0 - MIRRORS_PASSED * mirrors)
@@ -275,7 +274,7 @@ def enter_readings(
         if nearest < math.inf:
             if is_echo and abs(r - nearest) <= 2.0 * sigma + cell_m:
                 answers[0] += 1.0
-            elif nearest < passed - BEYOND_M:
+            elif nearest < passed - PASSED_M:
                 answers[1] += 1.0
     enter_hits(planes, maybe_sure, place, DIRECTED_UNIT + MIRRORS_UNIT * mirrors, arc[:m], shares, draws)
 
@@ -337,7 +336,7 @@ class DirectedGrid:
         """Enter a firing; see `EvidenceGrid.observe`."""
         if not self.window.follow(firing.pose, (self.cells, self._maybe_sure)):
             return
-        self._place = 1 + place % (PLACE_NUMBERS - 1)  # never NO_PLACE_NUMBER
+        self._place = 1 + place % (PLACE_NUMBERS - 1)  # never NO_NUMBER
         enter_readings(
             self._planes,
             self._maybe_sure,
@@ -379,7 +378,5 @@ class DirectedGrid:
 def arc_cells_max(window: Window, ring: Ring) -> int:
     """Return how many cells the arc of one echo has at most."""
     reach = min(ring.reach_m, math.sqrt(2.0) * window.cells * window.cell_m) / window.cell_m
-    thickness = (
-        2.0 * UNDIRECTED_ARC_SIGMAS * max(SPREAD_CELLS, ring.rounding_m / window.cell_m, SPREAD_RELATIVE * reach)
-    )
+    thickness = 2.0 * ARC_SIGMAS * max(SPREAD_CELLS, ring.rounding_m / window.cell_m, SPREAD_RELATIVE * reach)
     return int((2.0 * ring.half_angle * (reach + thickness) + 4.0) * (thickness + 2.0))

@@ -19,14 +19,12 @@ from config.settings import GridConfig
 from drivers.messages import Firing
 from perception.bounds import COUNT, PLACE, bounds
 from perception.kernel import Floats
-from perception.mapping.grid.known_cells import EVEN
 from perception.mapping.grid.sight_lines import SightLines
 from perception.mapping.grid.window import Ring, Window
 from perception.percept import OccupancyWindow
 from perception.sensor_mounts import mounts_array
+from perception.shared_numbers import EVEN, READING_M
 
-READINGS_PLACE_M: Final = 0.1
-"""Readings on so much way are from one place."""
 HEARD_M: Final = 0.25
 """Width of the bins in which ranges are counted."""
 HEARD_SHARE: Final = 0.98
@@ -53,7 +51,7 @@ class GridMethod(Protocol):
         bearings : (n,) float
             Where in its beam each echo came from, rad from the axis; NaN where that is not known.
         place : int
-            Where on its way the robot is, in steps of `READINGS_PLACE_M`.
+            Where on its way the robot is, in steps of `READING_M`.
         silence_m : float
             Distance to which a beam without an echo shows free space, m.
         """
@@ -140,8 +138,8 @@ class EvidenceGrid:
 
     @property
     def place(self) -> int:
-        """Where on its way the robot is, in steps of `READINGS_PLACE_M`."""
-        return 1 + int(self._way_m / READINGS_PLACE_M)
+        """Where on its way the robot is, in steps of `READING_M`."""
+        return 1 + int(self._way_m / READING_M)
 
     def crossed_before(
         self, holding: NDArray[np.bool_], firings: Iterable[tuple[Firing, Floats, int]]

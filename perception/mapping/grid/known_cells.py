@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception.percept import OccupancyWindow
+from perception.shared_numbers import EVEN
 
 UNKNOWN: Final = -1
 """In place of a probability in per cent, as in ROS's `nav_msgs/OccupancyGrid`."""
-EVEN: Final = 0.5
-"""The probability of a cell of which nothing is known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.bounds import Bound, bounds
 from perception.kernel import Floats, Ints, kernel
-from perception.mapping.grid.cell_evidence import BEYOND_M, PLACE_NUMBERS
+from perception.mapping.grid.cell_evidence import PLACE_NUMBERS
 from perception.mapping.grid.window import (
     SPREAD_CELLS,
     SPREAD_RELATIVE,
@@ -41,6 +41,7 @@ from perception.mapping.grid.window import (
     set_edges,
 )
 from perception.sensor_mounts import SensorPose
+from perception.shared_numbers import PASSED_M
 
 LOCATED_RAD: Final = 0.07
 """Greatest angle off the line on which an echo from something recognised came, rad. In three random rooms with
@@ -154,7 +155,7 @@ def follow_rays(
     for ray in range(RAYS):
         beside = ((bits << 1) >> ray) & 7  # the line and both beside it
         shares[ray] = ((beside & 1) + (beside >> 1 & 1) + (beside >> 2)) / max(1, answers)
-    return -1 if nearest < r - BEYOND_M else 1 if in_middle else 0
+    return -1 if nearest < r - PASSED_M else 1 if in_middle else 0
 
 
 @kernel

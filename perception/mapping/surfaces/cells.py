@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.angles import ROUNDING_RAD
 from perception.kernel import kernel
 from perception.mapping.surfaces.parameters import (
     ANSWER_MIN,
@@ -23,14 +22,12 @@ from perception.mapping.surfaces.parameters import (
     CELLS,
     DIRECTIONS,
     NEARER_M,
-    OUTLIER,
     OWN_HITS_MIN,
     PRIOR_READINGS,
     REACH_M,
     SAMPLES,
     SHARE_BITS,
     SHARES_A_WORD,
-    SILENCE_M,
     STRENGTH_SHARE,
     TAIL_CELLS,
     TAIL_SHARE,
@@ -39,6 +36,7 @@ from perception.mapping.surfaces.parameters import (
 )
 from perception.mapping.surfaces.records import BLOCK, RIM, WORDS, CellCounts, KeptReading, LocalMap
 from perception.records import Records
+from perception.shared_numbers import LEAST_READINGS, OUTLIER, ROUNDING, SILENCE_M
 
 BLUR: Final = 16.0
 """Sum of the weights 1, 2, 4 with which the hits of 3 × 3 cells are blurred."""
@@ -46,8 +44,6 @@ HITS: Final = 3.0 / (BLUR * WHOLE)
 """A surface of three cells' thickness gets whole echoes, which blurring divides among them."""
 LEAST_HITS: Final = 0.03
 """Hits that every cell has without having been looked at: it answers with 6 %."""
-LEAST_READINGS: Final = 0.5
-"""Readings that every cell has without having been looked at."""
 AXIS_LOSS: Final = 0.5
 """At the beam's edge a pass counts half, less with the square of the angle. An echo is as likely from there as
 from the middle: 42 to 67 % of the drives' echoes are from the outer third, as a slanting surface is nearest there."""
@@ -165,9 +161,9 @@ def enter_passes(cells: CellCounts, q: KeptReading, half: float, sign: int) -> N
 @kernel
 def away_from_zero(x: float) -> float:
     """Return a divisor: a number, or one of the same sign near it that is not so small."""
-    if abs(x) >= ROUNDING_RAD:
+    if abs(x) >= ROUNDING:
         return x
-    return ROUNDING_RAD if x >= 0.0 else -ROUNDING_RAD
+    return ROUNDING if x >= 0.0 else -ROUNDING
 
 
 @kernel

@@ -34,20 +34,14 @@ WHOLE_PASS: Final = 16
 """A pass along the beam's axis; at the beam's edge it counts half."""
 NEARER_M: Final = 0.1
 """A range passed through what is nearer by this. Drives: 0.06 and 0.15 lose 1 to 2 % at the same false share."""
-SILENCE_M: Final = 2.5
-"""Way for which silence counts as a pass."""
 PRIOR_READINGS: Final = 1.0
 """Readings of one direction for which the other directions of a cell stand. Drives: 0.1 to 1 within 1 %."""
-OUTLIER: Final = 0.005
-"""Probability of an echo from nowhere, beside those of the places on its arc."""
 REVISITS: Final = 3
 """Times that an earlier echo is shared again for each new reading. Drives: 2 as good, none 2 to 4 % more false."""
 LAST_REVISITS: Final = 3
 """Times that all echoes are shared again before a local map is left."""
-SPACING_M: Final = 0.02
-"""A sensor that has moved by less than this, and turned by less than `SPACING_RAD`, says the same again."""
 SPACING_RAD: Final = 0.02
-"""Turn in `SPACING_M`."""
+"""A sensor that has moved by less than `SPACING_M`, and turned by less than this, says the same again."""
 READINGS_MAX: Final = 12288
 """Readings of a local map, at most."""
 READINGS_KEPT: Final = 6144
@@ -74,9 +68,7 @@ SURFACE_CELLS_MAX: Final = 12288
 PIECES_MAX: Final = 384
 """Straight pieces of a local map, at most."""
 OFF_LINE_M: Final = 0.06
-"""A cell belongs to a straight piece within this."""
-TAKEN_M: Final = 0.06
-"""Cells within this of a piece start no other one."""
+"""A cell belongs to a straight piece within this, and starts no other one."""
 GAP_M: Final = 0.15
 """Greatest gap in a piece; 0.2 adds false length, 0.1 loses walls between mirrors."""
 PIECE_MIN_M: Final = 0.25

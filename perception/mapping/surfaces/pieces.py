@@ -26,7 +26,6 @@ from perception.mapping.surfaces.parameters import (
     PIECE_MIN_M,
     STRENGTH_MIN,
     SURFACE_CELLS_MAX,
-    TAKEN_M,
     WEAK_MIN,
     WHOLE,
 )
@@ -42,6 +41,7 @@ from perception.mapping.surfaces.records import (
     SurfaceCell,
 )
 from perception.records import Records
+from perception.shared_numbers import ROUNDING
 
 ROW_PARTS: Final = CELLS * CELLS // BLOCK
 """Parts of rows, as long as a block."""
@@ -59,8 +59,6 @@ FREE_SHARE_MIN: Final = 0.25
 """A line whose cells are nearly all taken is not followed on. Drives: the same pieces in two thirds of the time."""
 DIRECTION_STEPS: Final = 60
 """Steps along a line that take as long as to find a direction."""
-SAME_LINE_M: Final = 1e-9
-"""A line that a fit has moved and turned (m, rad) by less is the same but for rounding."""
 STEP_M: Final = 0.7 * CELL_M
 """Step along a line in which cells are looked for: less than a cell, so that none is left out."""
 OFFSETS: Final = 2
@@ -298,7 +296,7 @@ def grow(room: LocalMap, counts: CellCounts, seed: int) -> bool:
             ux, uy = math.cos(turn), math.sin(turn)
             moved = max(abs(mx), abs(my), abs(ux * piece.uy - uy * piece.ux))
             piece.x, piece.y, piece.ux, piece.uy = piece.x + mx, piece.y + my, ux, uy
-            if moved < SAME_LINE_M and sums[11] == 0.0:  # the same cells would be met again
+            if moved < ROUNDING and sums[11] == 0.0:  # the same cells would be met again
                 break
     piece.low, piece.high = sums[8] - 0.5 * CELL_M, sums[9] + 0.5 * CELL_M
     is_long = piece.high - piece.low >= PIECE_MIN_M
@@ -318,7 +316,7 @@ def take(room: LocalMap, counts: CellCounts, number: int) -> None:
     for step in range(steps + 1):
         along = piece.low + step * STEP_M
         for k in range(-OFFSETS, OFFSETS + 1):
-            off = k * TAKEN_M / OFFSETS
+            off = k * OFF_LINE_M / OFFSETS
             i = cell_of(piece.x + along * piece.ux - off * piece.uy)
             j = cell_of(piece.y + along * piece.uy + off * piece.ux)
             if i < 0 or j < 0 or counts.index[i, j] == 0:

@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from perception.kernel import kernel
-from perception.mapping.surfaces.cells import LEAST_READINGS, direction_strength, hits_around, passes_of_heard
+from perception.mapping.surfaces.cells import direction_strength, hits_around, passes_of_heard
 from perception.mapping.surfaces.parameters import (
     CELL_M,
     CELLS,
@@ -20,6 +20,7 @@ from perception.mapping.surfaces.parameters import (
 )
 from perception.mapping.surfaces.pieces import offset_of
 from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCounts, LocalMap, SurfaceCell
+from perception.shared_numbers import LEAST_READINGS
 
 APART: Final = round(NODE_M / CELL_M)
 LINKED: Final = round(LINK_M / CELL_M)

@@ -17,7 +17,6 @@ from perception.mapping.surfaces.parameters import (
     LEFT_MAX_M,
     READINGS_MAX,
     REVISITS,
-    SPACING_M,
     SPACING_RAD,
 )
 from perception.mapping.surfaces.piece_fit import group_echoes, judge, place_echoes
@@ -25,9 +24,8 @@ from perception.mapping.surfaces.pieces import ROW_PARTS, capture, grow_all, ord
 from perception.mapping.surfaces.polylines import chain_all, choose_nodes
 from perception.mapping.surfaces.records import BLOCK, CellCounts, LocalMap
 from perception.records import Records
+from perception.shared_numbers import FAR, SPACING_M
 
-SILENCE: Final = 1e6
-"""Range of silence, m."""
 ENTERED: Final = 16
 """Readings that one quantum enters, in a twentieth of a millisecond, as each of those below."""
 SHARED: Final = 48
@@ -88,7 +86,7 @@ def keep(rooms: Records[LocalMap], mounts: Floats, pose: Floats, ranges: Floats,
         room.kept_x[k], room.kept_y[k], room.kept_axis[k] = x, y, axis
         q = room.readings[room.count]
         q.x, q.y, q.axis = x - room.centre_x, y - room.centre_y, axis
-        q.range_m = ranges[k] if ranges[k] < range_max else SILENCE
+        q.range_m = ranges[k] if ranges[k] < range_max else FAR
         q.submap = room.submap
         room.count += 1
 

@@ -25,6 +25,7 @@ from config.settings import GridConfig
 from config.world import WorldConfig
 from drivers.messages import Firing, Floats, Pose
 from perception.percept import OccupancyWindow
+from perception.shared_numbers import EVEN
 from runtime.analysis.export.shapes import scans_of
 from runtime.analysis.timeline import Echoes
 
@@ -161,7 +162,7 @@ def run_evidence(
         It is too large.
     """
     from perception.mapping.grid.evidence_grid import EvidenceGrid
-    from perception.mapping.grid.known_cells import EVEN
+    # X
 
     cells = 2 ** math.ceil(math.log2(max(32.0, float((high - low).max()) / CELL_M + 1.0)))
     if cells > CELLS_MAX:

@@ -8,7 +8,6 @@ import numpy as np
 
 from config.load import load_model, load_settings
 from perception.bayes.inference.kernel_settings import make_settings
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import POLYGON_BEARING_BINS
 from perception.bayes.memory.scratch import Score
 from perception.bayes.memory.settings_record import PolygonSide
@@ -16,6 +15,7 @@ from perception.bayes.memory.state import Memory
 from perception.bayes.polygons.likelihood import score_polygon
 from perception.kernel import Floats
 from perception.records import Records, records, zeros
+from perception.shared_numbers import FAR
 from tests import naive_polygon
 from tests.naive_polygon import Rule
 from tests.perception.bayes.random_tracks import numbers, readings_of

@@ -14,7 +14,6 @@ from perception.bayes.inference import reservoir
 from perception.bayes.inference.kernel_settings import make_settings
 from perception.bayes.inference.outline_map import bucket_index
 from perception.bayes.inference.prediction import predict_circle
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import BUCKETS, MAX_LINES, Reading
 from perception.bayes.memory.parameters import OUTLINE_CELL_M
 from perception.bayes.memory.scratch import Predictions
@@ -24,6 +23,7 @@ from perception.bayes.segments.segment_list import put_segment
 from perception.kernel import Floats
 from perception.records import Records, array_of, records, zeros
 from perception.sensor_mounts import mounts_array
+from perception.shared_numbers import FAR
 from tests import naive_bayes
 from tests.naive_tracks import Line
 

@@ -8,12 +8,12 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from perception.bayes.inference import range_fit
 from perception.bayes.inference.likelihood import build_levels, build_table
 from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.settings_record import RANGE_BINS_PER_M, TABLE_LEVELS, NoiseModel, SettingsRecord
 from perception.kernel import Floats
 from perception.records import Record, Records, array_of, records, zeros
+from perception.shared_numbers import FAR
 from tests import naive_bayes
 from tests.perception.bayes.random_tracks import P as SHIPPED
 from tests.perception.bayes.random_tracks import changed, numbers, pair, readings_of
@@ -102,7 +102,7 @@ def cases(
                 r = max(0.05, d * math.cos(bearing - middle) - rho)
             r = round((r + rng.normal() * 0.01) / (2 * HALF_BOX)) * 2 * HALF_BOX + 0.0041
             chance = rng.random()
-            r = rng.uniform(0.15, 4.5) if chance < 0.1 else range_fit.FAR if chance < 0.15 else max(r, 0.02)
+            r = rng.uniform(0.15, 4.5) if chance < 0.1 else FAR if chance < 0.15 else max(r, 0.02)
             w[j] = (
                 *(centre - d * np.array([math.cos(bearing), math.sin(bearing)])),
                 math.cos(axis),

@@ -13,7 +13,6 @@ import pytest
 
 from drivers.messages import Firing, Pose
 from perception.bayes.bayes_method import BayesPerception
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.state import ESTABLISHED, FREE, TENTATIVE
 from perception.bayes.reports.object_report import CIRCLE_FIELDS, circle_object
 from perception.bayes.segments.segment_list import count_again
@@ -22,6 +21,7 @@ from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import ConfirmObject, PinSegments, PlaceModel
 from perception.kernel import Floats, kernel
 from perception.records import Structured, records, zeros
+from perception.shared_numbers import FAR
 from runtime.simulation.scenes import halls, readings
 from tests.perception.bayes.random_tracks import BOXES, NOISES, SENSORS, SETTINGS
 

@@ -11,8 +11,8 @@ import pytest
 from perception.records import records, zeros
 from perception.sensor_faults.memory import RingMemory
 from perception.sensor_faults.report import STUCK
-from perception.sensor_faults.silence import SAME_ECHO_M
 from perception.sensor_faults.turning import IN_PLACE_M, follow_turn, repeats_through_turn
+from perception.shared_numbers import SAME_ECHO_M
 from tests.perception.sensor_faults.test_reading_tests import COUNT, Checker, ring, sensors
 
 STEP_RAD = 0.1

@@ -7,9 +7,9 @@ import pytest
 
 from perception.bayes.circles import alternatives
 from perception.bayes.inference import noise_estimation
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.state import Memory
 from perception.kernel import Floats
+from perception.shared_numbers import FAR
 from tests import naive_bayes, naive_tracks
 from tests.naive_tracks import FT
 from tests.perception.bayes.random_tracks import (

@@ -9,10 +9,10 @@ import pytest
 
 from perception.bayes.circles import heard_rays
 from perception.bayes.inference import beam
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import HISTORY
 from perception.bayes.memory.state import ESTABLISHED, RAYS_MAX, Memory
 from perception.kernel import Floats
+from perception.shared_numbers import FAR
 from tests.perception.bayes.inference.test_beam import first_hit, rays_of
 from tests.perception.bayes.random_tracks import RADII, SENSORS, P, S, enter_readings, keep
 

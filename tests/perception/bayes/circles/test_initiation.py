@@ -9,11 +9,11 @@ import pytest
 
 from perception.bayes.circles import initiation as track_initiation
 from perception.bayes.inference.outline_map import add_to_map
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import HISTORY
 from perception.bayes.memory.parameters import NEW_LINE_HITS_MIN, OUTLINE_CELL_M
 from perception.bayes.memory.state import FREE, TENTATIVE, CircleTrack, Memory
 from perception.records import records, zeros
+from perception.shared_numbers import FAR
 from tests.perception.bayes.random_tracks import (
     RADII,
     SENSORS,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perception.bayes.circles import lateral_search
-from perception.bayes.inference.range_fit import FAR
+from perception.shared_numbers import FAR
 from tests import naive_bayes
 from tests.naive_tracks import FT
 from tests.perception.bayes.random_tracks import (

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from perception.bayes.inference import lines as walls
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import MAX_LINES
 from perception.bayes.memory.scratch import LineFit, LineScore
 from perception.records import records, zeros
+from perception.shared_numbers import FAR
 from tests import naive_tracks
 from tests.naive_tracks import FT
 from tests.perception.bayes.random_tracks import (

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from perception.bayes.inference import noise_estimation
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.state import ESTABLISHED
+from perception.shared_numbers import FAR
 from tests import naive_tracks
 from tests.perception.bayes.random_tracks import (
     NOISES,

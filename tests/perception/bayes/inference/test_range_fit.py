@@ -10,6 +10,7 @@ from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.scratch import CircleFit, LineFit, LineScore, Score
 from perception.kernel import Floats
 from perception.records import Records
+from perception.shared_numbers import FAR
 from tests import naive_bayes
 from tests.perception.bayes.random_tracks import examples, pair, predictions, readings_of
 from tests.perception.bayes.range_cases import COSINES, GATE, MISS, OPT, SHORT, Case, cases, one
@@ -67,7 +68,7 @@ def test_a_lines_fit_and_score_equal_their_oracles(examples: int) -> None:
         assert out[:3] == pytest.approx([*n, c], abs=1e-6)
         range_fit.score_line(case.readings, fit[0], *case.place, case.p, case.level, score[0])
         want = naive_bayes.score_line(
-            case.used, out[:2], case.centre, float(out[2]), COSINES, GATE, MISS, case.noise, range_fit.FAR
+            case.used, out[:2], case.centre, float(out[2]), COSINES, GATE, MISS, case.noise, FAR
         )
         assert fields == pytest.approx(want, rel=1e-12, abs=1e-11)
 
@@ -75,7 +76,7 @@ def test_a_lines_fit_and_score_equal_their_oracles(examples: int) -> None:
 def test_without_an_echo_a_fit_does_not_move_and_the_score_has_no_hits() -> None:
     case = next(cases(1, 7))
     silent = case.used.copy()
-    silent[:, 4] = range_fit.FAR
+    silent[:, 4] = FAR
     fit, out = one(CircleFit)
     args = ((0.2, 0.3, 0.3), case.p, 9.0, (case.var0, case.rel2), 4)
     assert range_fit.fit_circle(readings_of(silent), *args, predictions(), fit[0])

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from perception.bayes.memory import parameters as p
+from perception.bayes.memory.parameters import TRIPLE_MAX_M
+from perception.shared_numbers import EVEN
 
 
 def test_a_name_is_kept_at_a_lower_probability_than_it_is_given() -> None:
-    assert p.DOUBT_PROBABILITY < p.NAME_KEPT_PROBABILITY < p.ESTABLISH_PROBABILITY
+    assert p.DOUBT_PROBABILITY < EVEN < p.ESTABLISH_PROBABILITY
 
 
 def test_a_longer_baseline_is_tried_than_the_longest_of_the_series() -> None:
     assert p.BASELINE_MIN_M * 2 ** (p.BASELINES - 1) < p.BASELINE_MAX_M
-    assert p.NEIGHBOUR_BASELINE_MIN_M < p.NEIGHBOUR_BASELINE_MAX_M
+    assert p.NEIGHBOUR_BASELINE_MIN_M < TRIPLE_MAX_M
 
 
 def test_a_grid_of_the_expected_width_is_not_laid_again() -> None:

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, Memory
 from perception.bayes.polygons import alternatives
 from perception.kernel import Floats
+from perception.shared_numbers import FAR
 from tests import naive_bayes
 from tests.perception.bayes.box_readings import LEVEL, P, S, enter_job, heard
 from tests.perception.bayes.random_tracks import COSINES, SENSORS, TRACKS, noises, readings_of, unit

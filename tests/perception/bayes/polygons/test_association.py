@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import MAX_POLYGONS
 from perception.bayes.memory.scratch import POLYGON, UNEXPLAINED
 from perception.bayes.memory.state import ESTABLISHED, TENTATIVE, Memory
 from perception.bayes.polygons import association
 from perception.bayes.polygons.readings import bears_on_polygon
 from perception.kernel import Floats
+from perception.shared_numbers import FAR
 from tests.perception.bayes.box_readings import BOX, CLOSED, LEVEL, SIDES, P, S, enter_job, heard, random_pose, rules
 from tests.perception.bayes.random_tracks import SENSORS, TRACKS, examples, numbers, readings_of
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from perception.bayes.inference.likelihood import level_of, log_likelihood
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.job_records import PoseSearch
 from perception.bayes.memory.scratch import Score
 from perception.bayes.polygons.cross_path import NO_ANSWER_M
 from perception.bayes.polygons.likelihood import begin_search, continue_search, predict
 from perception.records import records, zeros
+from perception.shared_numbers import FAR
 from tests import naive_polygon
 from tests.perception.bayes.box_readings import (
     BOX,

@@ -8,7 +8,6 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.job_records import PoseSearch
 from perception.bayes.memory.polygon_parameters import LATTICE_ATTEMPTS, LATTICE_CORRELATION_SHARE, LATTICE_PITCH
 from perception.bayes.memory.scratch import Score
@@ -29,6 +28,7 @@ from perception.bayes.polygons.posterior import (
 from perception.bayes.reports.object_report import polygon_covariance
 from perception.kernel import Floats
 from perception.records import records, zeros
+from perception.shared_numbers import FAR
 from tests.perception.bayes.box_readings import (
     CLOSED,
     LEVEL,

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from perception.bayes.inference import noise_estimation, placement
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import HISTORY
 from perception.bayes.memory.parameters import MAPPED_LENGTH_MIN_M
 from perception.bayes.memory.scratch import PairSegment
@@ -15,6 +14,7 @@ from perception.bayes.segments.segment_list import mapped_segments
 from perception.bayes.segments.segment_pairs import tangent
 from perception.bayes.tracks import observe
 from perception.records import records, zeros
+from perception.shared_numbers import FAR
 from tests import naive_tracks
 from tests.perception.bayes.random_tracks import (
     MOUNTS,

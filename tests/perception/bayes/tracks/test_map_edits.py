@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.elements import HISTORY
 from perception.bayes.memory.parameters import REJECTED_MAX_NAT
 from perception.bayes.memory.scratch import POLYGON
@@ -24,6 +23,7 @@ from perception.edits import (
     PlaceModel,
     RemoveObject,
 )
+from perception.shared_numbers import FAR
 from tests.perception.bayes import box_readings
 from tests.perception.bayes.random_tracks import (
     RADII,

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.parameters import CONFIRMED_SIDES, TRUSTED_M
 from perception.bayes.memory.state import ESTABLISHED, FREE, Memory
 from perception.bayes.memory.wall_records import Wall
 from perception.bayes.tracks import model_check
+from perception.shared_numbers import FAR
 from tests import naive_bayes, naive_naming, naive_walls
 from tests.naive_walls import Array
 from tests.perception.bayes import box_readings

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.state import ESTABLISHED, Memory
 from perception.bayes.memory.wall_records import CORNERS_MAX, EDGES_MAX, WallMap
 from perception.bayes.walls import corners as wall_corners
 from perception.bayes.walls.crossing import position_along
+from perception.shared_numbers import FAR
 from tests.perception.bayes.random_tracks import P, S, examples, pair
 from tests.perception.bayes.rooms import SIGMA, fill, new_room, place_wall, reading
 

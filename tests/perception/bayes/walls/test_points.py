@@ -7,17 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.polygon_parameters import EDGE_REACH_M
 from perception.bayes.memory.state import Memory
 from perception.bayes.memory.wall_records import WallMap
 from perception.bayes.reports.object_report import corner_object
 from perception.bayes.walls.contact import HEARD_REACH_M
-from perception.bayes.walls.corners import EDGE_ECHOES_MIN, KEPT, find_corners
+from perception.bayes.walls.corners import EDGE_ECHOES_MIN, EDGE_SAME_M, KEPT, find_corners
 from perception.bayes.walls.points import (
     ACROSS_M,
     FIRST_M,
-    KNOWN_POINT_M,
     LINE_CELL_M,
     LINE_CELLS,
     SLANT_MIN,
@@ -27,6 +25,7 @@ from perception.bayes.walls.points import (
 )
 from perception.bayes.walls.report import room_report
 from perception.bayes.walls.reported_points import ALONE_EDGE_ECHOES
+from perception.shared_numbers import FAR
 from tests.naive_walls import line_cuts
 from tests.perception.bayes.random_tracks import P
 from tests.perception.bayes.rooms import SIGMA, fill, new_room, place_wall
@@ -88,7 +87,7 @@ def test_a_corner_that_is_heard_beyond_the_end_of_a_wall_is_found_kept_and_repor
 def test_a_point_displaces_one_of_fewer_echoes_but_none_that_was_sure_at_the_stop(*, is_kept: bool) -> None:
     _, room = mirrors()
     room.edges[0].is_used, room.edges[0].echoes, room.edges[0].is_kept = KEPT, 3.0, int(is_kept)
-    room.edges[0].x, room.edges[0].y = (CORNER + 0.5 * KNOWN_POINT_M).tolist()
+    room.edges[0].x, room.edges[0].y = (CORNER + 0.5 * EDGE_SAME_M).tolist()
     found = room.edges[1]
     found.x, found.y = CORNER.tolist()
     found.echoes = 12.0
@@ -100,7 +99,7 @@ def test_an_edge_of_fewer_echoes_stays_where_another_one_keeps_the_point_out() -
     _, room = mirrors()
     for edge, echoes in zip(room.edges[:2], (3.0, 20.0), strict=True):
         edge.is_used, edge.echoes = KEPT, echoes
-        edge.x, edge.y = (CORNER + 0.5 * KNOWN_POINT_M).tolist()
+        edge.x, edge.y = (CORNER + 0.5 * EDGE_SAME_M).tolist()
     found = room.edges[2]
     found.x, found.y = CORNER.tolist()
     found.echoes = 12.0
@@ -121,7 +120,7 @@ def test_a_corner_that_ranges_passed_or_that_a_wall_would_be_or_that_is_known_is
     assert used(room) == [], "a wall across answers from its own feet"
     hear_corner(room)
     edge = room.edges[7]
-    edge.is_used, edge.is_edge, edge.x, edge.y = 1, 1, CORNER[0], CORNER[1] + 0.5 * KNOWN_POINT_M
+    edge.is_used, edge.is_edge, edge.x, edge.y = 1, 1, CORNER[0], CORNER[1] + 0.5 * EDGE_SAME_M
     edge.echoes = 100.0
     find_heard_points(memory, P, 0)
     assert used(room) == [], "known as an edge"
@@ -235,14 +234,14 @@ def test_a_post_that_ranges_passed_or_that_is_heard_from_afar_or_lies_too_far_be
 
 
 def test_what_is_known_by_more_echoes_stays() -> None:
-    for echoes, expected in ((1.0, tuple(EDGE)), (50.0, (2.0, EDGE[1] + 0.5 * KNOWN_POINT_M))):
+    for echoes, expected in ((1.0, tuple(EDGE)), (50.0, (2.0, EDGE[1] + 0.5 * EDGE_SAME_M))):
         memory, room = mirrors()
         known = room.edges[7]
         known.is_used, known.is_edge, known.x, known.y, known.echoes = (
             KEPT,
             1,
             2.0,
-            EDGE[1] + 0.5 * KNOWN_POINT_M,
+            EDGE[1] + 0.5 * EDGE_SAME_M,
             echoes,
         )
         known.heard.xx = known.heard.yy = 1e4

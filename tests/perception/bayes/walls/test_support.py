@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.inference.range_fit import FAR
 from perception.bayes.memory.scratch import NearReadings
 from perception.bayes.memory.wall_records import IS_FREE, IS_KNOWN, RECENT_READINGS_MAX, RecentReading, Wall, WallMap
 from perception.bayes.walls import support as wall_support
 from perception.bayes.walls.contact import BEAM_EDGE, FOOT, NOWHERE, contact, range_sigma
 from perception.records import Records, records, zeros
+from perception.shared_numbers import FAR
 from tests.perception.bayes.random_tracks import P, S, examples
 from tests.perception.bayes.rooms import new_room, place_wall
 

@@ -9,6 +9,7 @@ import pytest
 
 from perception.localization.drift import landmark_association as kernels
 from perception.localization.drift.landmark_state import FIRST, SonarModel, X, Y
+from perception.shared_numbers import NO_INDEX
 from tests.perception.localization.drift.test_landmark_ranges import HALF_ANGLE, RADIUS_M, VARIANCES, new_filter
 
 SONAR = SonarModel(*VARIANCES, HALF_ANGLE, 0.2, 7.0)
@@ -43,10 +44,10 @@ def test_the_nearest_in_deviations_explains_a_range_and_the_nearest_of_all_is_ex
 def test_a_range_between_two_landmarks_is_ambiguous_and_silence_is_of_none() -> None:
     e, covariance = new_filter([(2.0, 0.0), (2.02, 0.0)])
     assert kernels.associate(e, covariance, AHEAD, 2.01 - RADIUS_M, SONAR)[2]
-    assert kernels.associate(e, covariance, AHEAD, math.inf, SONAR)[0] == kernels.NO_LANDMARK
+    assert kernels.associate(e, covariance, AHEAD, math.inf, SONAR)[0] == NO_INDEX
 
 
 def test_nothing_is_expected_outside_the_beam() -> None:
     e, covariance = new_filter([(0.0, 2.0), (-2.0, 0.0)])
     best, _, _, first, nearest, is_expected = kernels.associate(e, covariance, AHEAD, 2.0 - RADIUS_M, SONAR)
-    assert (best, first, nearest, is_expected) == (kernels.NO_LANDMARK, kernels.NO_LANDMARK, math.inf, False)
+    assert (best, first, nearest, is_expected) == (NO_INDEX, NO_INDEX, math.inf, False)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perception.localization.drift import landmark_ranges as kernels
-from perception.localization.drift.landmark_association import NO_LANDMARK, is_landmark_hidden
+from perception.localization.drift.landmark_association import is_landmark_hidden
 from perception.localization.drift.landmark_filter import add_landmark, propagate
 from perception.localization.drift.landmark_state import (
     FIRST,
@@ -24,6 +24,7 @@ from perception.localization.drift.landmark_state import (
     Y,
 )
 from perception.records import Records, records, zeros
+from perception.shared_numbers import NO_INDEX
 from tests.naive_landmarks import Array
 
 HALF_ANGLE = math.radians(12.0)
@@ -55,14 +56,14 @@ def test_a_reading_is_from_the_landmark_it_fits() -> None:
     e, covariance = new_filter([(2.0, 0.0), (3.5, 0.1), (0.0, 2.0)])
     assert enter(e, covariance, 2.0 - 0.4 - RADIUS_M) == 0
     assert enter(e, covariance, 3.5 - 0.4 - RADIUS_M) == 1
-    assert enter(e, covariance, 2.4) == NO_LANDMARK
-    assert enter(e, covariance, math.inf) == NO_LANDMARK
+    assert enter(e, covariance, 2.4) == NO_INDEX
+    assert enter(e, covariance, math.inf) == NO_INDEX
 
 
 def test_a_reading_that_two_landmarks_explain_is_not_used() -> None:
     e, covariance = new_filter([(2.0, 0.1), (2.0, -0.1)])
     before = covariance.copy()
-    assert enter(e, covariance, 1.3) == NO_LANDMARK
+    assert enter(e, covariance, 1.3) == NO_INDEX
     np.testing.assert_array_equal(covariance, before)
 
 
@@ -94,7 +95,7 @@ def test_an_echo_at_the_edge_of_the_beam_moves_the_landmark_in_and_silence_out(i
     off = side * HALF_ANGLE
     e, covariance = new_filter([(0.4 + 2.0 * math.cos(off), 2.0 * math.sin(off))], sigma=0.05)
     r = 2.0 - RADIUS_M if is_heard else math.inf
-    assert enter(e, covariance, r) == (0 if is_heard else NO_LANDMARK)
+    assert enter(e, covariance, r) == (0 if is_heard else NO_INDEX)
     at = e[0].landmarks[0]
     bearing = math.atan2(at.y - e[0].y, at.x - e[0].x - 0.4)
     assert (abs(bearing) < HALF_ANGLE) == is_heard
@@ -219,7 +220,7 @@ def test_a_range_of_a_farther_landmark_says_that_the_nearer_one_is_outside_the_b
 def test_a_landmark_outside_the_beam_may_answer_if_its_bearing_is_uncertain(sigma: float, is_heard: bool) -> None:
     off = HALF_ANGLE + math.radians(4.0)
     e, covariance = new_filter([(0.4 + 2.0 * math.cos(off), 2.0 * math.sin(off))], sigma)
-    assert enter(e, covariance, 2.0 - RADIUS_M) == (0 if is_heard else NO_LANDMARK)
+    assert enter(e, covariance, 2.0 - RADIUS_M) == (0 if is_heard else NO_INDEX)
 
 
 def test_landmarks_at_hardly_known_places_do_not_change_the_estimate_of_the_noise() -> None:
@@ -236,7 +237,7 @@ def test_a_hidden_landmark_is_not_missed() -> None:
     assert is_landmark_hidden(e, 0, 0.4, 0.0)
     assert not is_landmark_hidden(e, 1, 0.4, 0.0)
     before = covariance.copy()
-    assert enter(e, covariance, math.inf) == NO_LANDMARK
+    assert enter(e, covariance, math.inf) == NO_INDEX
     np.testing.assert_array_equal(covariance[FIRST : FIRST + 2], before[FIRST : FIRST + 2])
 
 

@@ -9,7 +9,8 @@ import pytest
 
 from drivers.messages import Firing, Pose
 from perception.kernel import Floats
-from perception.localization.known_room.keyframes import KEYFRAME_M, KEYFRAMES_MAX, Keyframes
+from perception.localization.known_room.keyframes import KEYFRAMES_MAX, Keyframes
+from perception.shared_numbers import READING_M
 
 MOUNTS = np.array([[0.2 * math.cos(a), 0.2 * math.sin(a), a] for a in np.linspace(0.0, 6.0, 8).tolist()])
 
@@ -52,10 +53,10 @@ def test_a_turn_ends_a_keyframe_and_a_stand_makes_one() -> None:
     assert np.flatnonzero(ended).tolist() == [7]
     assert keyframes.counts[0] == 8
     assert keyframes.observe(firing(0.0, 0.0, 0.2, range(1)))
-    assert not keyframes.observe(firing(KEYFRAME_M - 0.01, 0.0, 0.2, range(1)))
-    assert keyframes.observe(firing(KEYFRAME_M, 0.0, 0.2, range(1)))
-    assert keyframes.driven_m == pytest.approx(KEYFRAME_M)
-    assert keyframes.way_since(1) == pytest.approx(KEYFRAME_M)
+    assert not keyframes.observe(firing(READING_M - 0.01, 0.0, 0.2, range(1)))
+    assert keyframes.observe(firing(READING_M, 0.0, 0.2, range(1)))
+    assert keyframes.driven_m == pytest.approx(READING_M)
+    assert keyframes.way_since(1) == pytest.approx(READING_M)
 
 
 def test_the_keyframes_of_a_window_are_compounded() -> None:

@@ -15,12 +15,12 @@ from perception.mapping.surfaces.parameters import (
     NEARER_M,
     REACH_M,
     SAMPLES,
-    SILENCE_M,
     WHOLE,
     WHOLE_PASS,
 )
 from perception.mapping.surfaces.records import BLOCK, CellCounts, KeptReading, LocalMap
 from perception.records import Records, array_of, records, zeros
+from perception.shared_numbers import SILENCE_M
 
 pytestmark = pytest.mark.compiled
 HALF = math.radians(12.0)

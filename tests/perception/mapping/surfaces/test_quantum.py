@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from perception.mapping.surfaces import quantum
-from perception.mapping.surfaces.parameters import REVISITS, SPACING_M
+from perception.mapping.surfaces.parameters import REVISITS
 from perception.mapping.surfaces.records import CellCounts, LocalMap
 from perception.records import records, zeros
+from perception.shared_numbers import FAR, SPACING_M
 
 pytestmark = pytest.mark.compiled
 HALF = math.radians(12.0)
@@ -28,7 +29,7 @@ def test_a_sensor_that_has_moved_is_kept() -> None:
     assert local["count"] == 3
     readings = local["readings"][0, :3]
     np.testing.assert_allclose(readings["x"], [0.1, 0.0, 1.1 * SPACING_M])
-    np.testing.assert_allclose(readings["range_m"], [2.0, quantum.SILENCE, 1.0])
+    np.testing.assert_allclose(readings["range_m"], [2.0, FAR, 1.0])
     assert local["centre_x"] == 1.0
 
 
