@@ -19,7 +19,7 @@ import math
 from typing import Annotated, Final
 
 from perception.angles import SAME_RAD, wrapped
-from perception.bounds import FINITE, POSITIVE, Bound, Flag, Place
+from perception.bounds import FINITE, Bound, Flag, Place
 from perception.kernel import Floats, kernel
 from perception.records import Record, Records
 from perception.ring_faults.memory import EchoTrace
@@ -53,8 +53,6 @@ class Expected(Record):
     """The share of an honest sensor's readings that are not as expected."""
     honest_nat: Annotated[float, FINITE]
     """The logarithm of the density of what an honest sensor reads."""
-    alike: Annotated[float, POSITIVE]
-    """How many sensors expect an echo from the same surface: itself, and those whose beams overlap, by their part."""
 
 
 @kernel
@@ -186,15 +184,7 @@ def compare(
         one.is_off = 1 if is_known and r >= 0.0 and not one.low <= r <= one.high else 0
         misses += one.is_off or (is_known and r < 0.0)
         known += is_known
-    if 2 * misses <= known:
-        return False
-    for i in range(len(echoes)):
-        expected[i].alike = 0.0
-        for k in range(len(echoes)):
-            if expected[k].source >= 0 and expected[k].high >= 0.0:
-                off = abs(wrapped(echoes[k].latest.axis - echoes[i].latest.axis))
-                expected[i].alike += max(0.0, 1.0 - off / (2.0 * half_angle))
-    return True
+    return 2 * misses > known
 
 
 @kernel
@@ -232,8 +222,6 @@ def weigh_exchange(
 def weigh_length(k: int, reach: float, echoes: Records[EchoTrace], expected: Records[Expected]) -> float:
     """Return the evidence that all ranges are longer or shorter by as much as that of sensor `k`, nat.
 
-    Sensors whose beams overlap hear the same surface: those that expect an echo count as one, each by its part.
-
     Parameters
     ----------
     k : int
@@ -243,13 +231,12 @@ def weigh_length(k: int, reach: float, echoes: Records[EchoTrace], expected: Rec
     """
     longer = echoes[k].latest.range_m - 0.5 * (expected[k].low + expected[k].high)
     # Any length is as likely.
-    evidence = (math.log((1.0 - expected[k].missed) / (2.0 * reach)) - expected[k].honest_nat) / expected[k].alike
+    evidence = math.log((1.0 - expected[k].missed) / (2.0 * reach)) - expected[k].honest_nat
     for i in range(len(echoes)):
         one = expected[i]
         if i != k and one.source >= 0 and one.high >= 0.0:
             low, high = max(0.0, one.low + longer), max(0.0, one.high + longer) + WINDOW_MIN_M
-            likely = density(echoes[i].latest.range_m, low, high, reach, one.missed)
-            evidence += (math.log(likely) - one.honest_nat) / one.alike
+            evidence += math.log(density(echoes[i].latest.range_m, low, high, reach, one.missed)) - one.honest_nat
     return evidence
 
 
@@ -283,7 +270,7 @@ def weigh_changes(
         One of the changes, and the logarithm of its likelihood over that of an honest ring. Sensors whose beams
         overlap hear the same surface, and together count as one.
     """
-    found, most, overlap = NO_CHANGE, 0.0, max(1.0, len(echoes) * half_angle / math.pi)
+    found, most = NO_CHANGE, 0.0
     if not compare(half_angle, tolerance, reach, missed, mounts, echoes, expected):
         return found, most
     for k in range(len(echoes)):
@@ -293,10 +280,10 @@ def weigh_changes(
                 found, most = LENGTHENED, nats
     for part in range(1, TURNS):
         turn = math.tau * part / TURNS
-        nats = weigh_exchange(turn, half_angle, tolerance, reach, mounts, echoes, expected) / overlap
+        nats = weigh_exchange(turn, half_angle, tolerance, reach, mounts, echoes, expected)
         if nats > most:
             found, most = EXCHANGED, nats
-    return found, most
+    return found, most / max(1.0, len(echoes) * half_angle / math.pi)
 
 
 @kernel

@@ -42,11 +42,9 @@ def looks(before: Floats, latest: Floats, moved_m: float = 0.1, turned_rad: floa
     return echoes
 
 
-def weighed(
-    echoes: Records[EchoTrace], missed: float = MISSED, turning: float = MISSED, half_angle: float = HALF
-) -> tuple[int, float]:
+def weighed(echoes: Records[EchoTrace], missed: float = MISSED, turning: float = MISSED) -> tuple[int, float]:
     expected = records(Expected, zeros(Expected, COUNT))
-    return weigh_changes(MOUNTS, half_angle, TOLERANCE, REACH, (missed, turning), echoes, expected)
+    return weigh_changes(MOUNTS, HALF, TOLERANCE, REACH, (missed, turning), echoes, expected)
 
 
 def moved(ranges: Floats, moved_m: float = 0.1) -> Floats:
@@ -64,17 +62,6 @@ def test_a_length_that_all_ranges_have_in_common_is_found() -> None:
         change, nats = weighed(looks(ROOM, moved(ROOM) + length))
         assert change == LENGTHENED
         assert nats > ENOUGH_NAT
-
-
-def test_wide_beams_weigh_less_only_where_those_that_hear_overlap() -> None:
-    """Among mirrors few sensors of such a ring hear anything, each something else."""
-    wide = 2.5 * HALF
-    few = np.where(np.arange(COUNT) % 3 == 0, ROOM, math.inf)
-    for before, share in ((few, 1.0), (ROOM, 0.5)):
-        echoes = looks(before, before + 0.4572, moved_m=0.0)
-        change, nats = weighed(echoes, half_angle=wide)
-        assert change == LENGTHENED
-        assert nats == pytest.approx(share * weighed(echoes)[1], rel=0.2)
 
 
 def test_ranges_that_a_length_puts_beyond_reach_are_silent_and_those_at_zero_stay() -> None:
