@@ -246,15 +246,12 @@ class _KernelCache:
         self._allocates = allocates
 
     def load_overload(self, sig: Untyped, target_context: Untyped) -> Untyped:
-        """Return the compiled code for a signature, None if it is not there.
-
-        Nor is it where it names a type of another version that has moved since, with the same kernel.
-        """
+        """Return the compiled code for a signature, None if it is not there."""
         if self._allocates:
             target_context.refresh()
         try:
             data = _files()._load_data(self._name(sig, target_context))
-        except (FileNotFoundError, ImportError, AttributeError):
+        except FileNotFoundError:
             return None
         called, engine = data[1], target_context.codegen()._engine
         # Numba calls no code of which it has not seen the name, and ends the process for a name without code.
@@ -277,8 +274,18 @@ class _KernelCache:
 
     def _name(self, sig: Untyped, target_context: Untyped) -> str:
         args, _ = sigutils.normalize_signature(sig)
-        digest = _digests().of(self._kernel, f"{_processor(target_context.codegen())} {args}")
+        tuples = "".join(map(_named_tuples, args))
+        digest = _digests().of(self._kernel, f"{_processor(target_context.codegen())} {args}{tuples}")
         return f"{self._kernel.__module__}.{self._kernel.__name__}-{digest[:NAME_DIGITS]}.nbc"
+
+
+def _named_tuples(kind: Untyped) -> str:
+    """Return the place and the fields of each named tuple in a type: numba's name of it has neither."""
+    parts = "".join(map(_named_tuples, kind)) if isinstance(kind, types.BaseTuple) else ""
+    if not isinstance(kind, types.BaseNamedTuple):
+        return parts
+    made = kind.instance_class
+    return f" {made.__module__}.{made.__qualname__}{made._fields}{parts}"
 
 
 @functools.cache

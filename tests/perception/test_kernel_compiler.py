@@ -191,40 +191,37 @@ def test_code_that_could_not_be_loaded_is_not_said_to_be_there(monkeypatch: pyte
     assert names == set()
 
 
-MOVED: Final = """
+DIFFERENCE: Final = """
 from perception.kernel import kernel
 from {module} import Pair
 
 @kernel
-def total(pair: Pair) -> float:
-    return pair.a + pair.b
+def difference(pairs: tuple[Pair, float]) -> float:
+    return pairs[0].a - pairs[0].b
 
-print(total(Pair(1.0, 2.0)))
+print(difference((Pair(a=5.0, b=2.0), 0.0)))
 """
 PAIR: Final = """
 from typing import NamedTuple
 
 class Pair(NamedTuple):
-    a: float
-    b: float
+    {first}: float
+    {second}: float
 """
 
 
-def test_code_that_names_a_type_which_has_moved_is_compiled_anew(tmp_path: Path) -> None:
-    program, outputs = tmp_path / "moved.py", []
-    for module in ("before", "after"):
-        for other in tmp_path.glob("[ab]*.py"):
-            other.unlink()
-        (tmp_path / f"{module}.py").write_text(PAIR)
-        program.write_text(MOVED.format(module=module))
-        environment = {
-            **child_environment(),
-            "NUMBA_CACHE_DIR": str(tmp_path / "kernels"),
-            "PYTHONPATH": str(tmp_path),
-        }
-        run = subprocess.run([sys.executable, program], env=environment, check=True, capture_output=True, text=True)
+def test_code_for_a_named_tuple_is_not_that_for_one_elsewhere_or_with_other_fields(tmp_path: Path) -> None:
+    program, outputs = tmp_path / "differences.py", []
+    environment = {**child_environment(), "NUMBA_CACHE_DIR": str(tmp_path / "kernels"), "PYTHONPATH": str(tmp_path)}
+    for module, first, second in (("before", "a", "b"), ("after", "a", "b"), ("after", "b", "a")):
+        (tmp_path / "before.py").unlink(missing_ok=True)
+        (tmp_path / f"{module}.py").write_text(PAIR.format(first=first, second=second))
+        program.write_text(DIFFERENCE.format(module=module))
+        run = subprocess.run(
+            [sys.executable, "-B", program], env=environment, check=True, capture_output=True, text=True
+        )
         outputs.append(run.stdout.strip())
-    assert outputs == ["3.0", "3.0"]
+    assert outputs == ["3.0", "3.0", "3.0"]
 
 
 @kernel
