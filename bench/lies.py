@@ -31,7 +31,7 @@ from runtime.cycle.modes import Mode
 from runtime.cycle.mounting_limit import DOUBTED
 from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import apply_command, step
-from runtime.cycle.unheard_limit import LOST, UNHEARD
+from runtime.cycle.unheard_limit import LOST, REMEMBERED, UNHEARD
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget
 
 ROBOTS: Final = (
@@ -80,7 +80,7 @@ BUILT: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
 """Faults that a robot is built with: they are there from the start."""
 CLOCK, OF_TWO = "clock", ("exchanged", "but one")
 """Kinds with these words change nothing on a robot whose packets carry no stamps, and on one with one sensor."""
-HELD: Final = frozenset({LOST, NOTHING_NEW, NOTHING_YET, UNHEARD})
+HELD: Final = frozenset({LOST, NOTHING_NEW, NOTHING_YET, REMEMBERED, UNHEARD})
 """Reasons to hold that name a lie; that of a ring which seems to be turned names only one that is."""
 AHEAD_DEG: Final = 60.0
 MOVED_M: Final = 0.5

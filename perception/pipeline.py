@@ -294,7 +294,7 @@ class Perception:
 
     @property
     def unheard(self) -> UnheardEchoes:
-        """The echoes that fell silent as the robot came nearer."""
+        """The echoes that fell silent as the robot came nearer, and those that are remembered."""
         return self._echoes.unheard
 
     def surroundings(

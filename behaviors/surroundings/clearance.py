@@ -24,7 +24,7 @@ def free_path_m(percept: Percept, reach_m: float, beside_m: float = math.inf) ->
     half_m = min(reach_m, beside_m)
     pose, free_m = percept.pose, math.inf
     c, s = math.cos(pose.theta), math.sin(pose.theta)
-    for x, y in percept.obstacles.tolist():  # two dozen: numpy's calls would take longer
+    for x, y in percept.obstacles.tolist():  # some dozens: numpy's calls would take longer
         dx, dy = x - pose.x, y - pose.y
         ahead, lateral = c * dx + s * dy, c * dy - s * dx
         if ahead > 0.0 and abs(lateral) < half_m:

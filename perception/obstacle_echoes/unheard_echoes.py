@@ -237,7 +237,7 @@ def keep_sudden(
 
 
 class UnheardEchoes:
-    """The echo of each sensor that it lost and that nothing has contradicted since.
+    """The echo of each sensor that it lost and that nothing has contradicted since, and what all heard lately.
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ class UnheardEchoes:
         return np.array(kept, float).reshape(-1, 2)
 
     def take_ahead(self, pose: Pose, near_m: float, half_width_m: float) -> float | None:
-        """Return how far ahead the nearest steady one of a silent ring stands, m; all are then forgotten: it stops.
+        """Return how far ahead the nearest steady one of a silent ring stands, m; all lost ones are then forgotten.
 
         None if there is none in the robot's way so near, or if the ring has not been silent for `SILENT_ROUNDS`. Few
         sensors among mirrors are often silent for so long, and hear random echoes now and then.
@@ -339,11 +339,15 @@ class UnheardEchoes:
         near = ahead[(ahead > 0.0) & (ahead < near_m) & (np.abs(across) < half_width_m)]
         if not len(near):
             return None
-        self.clear()
+        self._forget_lost()
         return float(near.min())
+
+    def _forget_lost(self) -> None:
+        """Forget all lost echoes and walls."""
+        self._echoes["state"] = NOT_KEPT
+        self._walls_m[:] = math.inf
 
     def clear(self) -> None:
         """Forget all echoes and walls."""
-        self._echoes["state"] = NOT_KEPT
+        self._forget_lost()
         self.remembered.clear()
-        self._walls_m[:] = math.inf

@@ -1,17 +1,16 @@
-"""The speed beside echoes that the ring has lost although it came nearer to them, and before its first echo."""
+"""The speed beside echoes that the ring has lost, or that its sensors heard elsewhere, and before its first echo."""
 
 from __future__ import annotations
 
 import math
 from typing import Final
 
-import numpy as np
-
 from behaviors.surroundings.clearance import stoppable_speed_m_s
 from behaviors.teleoperation import Teleoperate
 from config.robot import PASSAGE_M
 from config.settings import Settings
 from drivers.messages import Pose, Twist
+from perception.obstacle_echoes.remembered_echoes import REMEMBERED_S
 from perception.obstacle_echoes.unheard_echoes import UnheardEchoes
 from perception.percept import Percept
 from runtime.cycle.drive_requests import DriveRequest
@@ -27,6 +26,11 @@ LOST: Final = (
 UNHEARD: Final = (
     "the ring no longer hears what stood in the way, although the robot has come nearer: the robot drives slowly "
     "until the ring hears it again, or something behind it; if this returns, check that the ring hears what is near"
+)
+REMEMBERED: Final = (
+    f"something was heard here in the last {REMEMBERED_S:.0f} s, and the sensors that look there now have heard "
+    f"nothing since: the robot drives slowly there until one of them hears anything, at most so long; if this "
+    f"returns, check that they hear (`echolocate ring-test`)"
 )
 
 
@@ -67,8 +71,8 @@ def limit_unheard(
 ) -> tuple[Twist, str | None]:
     """Return a velocity on the same curve that is slow where it leads to what was lost, and the reason if it is less.
 
-    So it is where a wall goes on that the ring heard before it heard nothing, and everywhere for a
-    reason that `EchoWatch` gives.
+    So it is at what is remembered, where a wall goes on that the ring heard before it heard nothing, and everywhere
+    for a reason that `EchoWatch` gives.
 
     Parameters
     ----------
@@ -96,12 +100,14 @@ def limit_unheard(
 
 
 def _limit_ahead(pose: Pose, percept: Percept, unheard: UnheardEchoes, settings: Settings) -> tuple[float, str]:
-    """Return the speed from which a robot stops before what was lost in the direction of a pose, m/s, and why."""
-    body, arbiter, limit, reason = settings.body, settings.behaviors.arbiter, math.inf, UNHEARD
-    remembered = unheard.remembered.ahead(pose, body.radius_m + arbiter.clearance_m)
-    if len(points := np.concatenate([unheard.points(), remembered])):
-        ahead = Percept(pose, points, percept.field_of_view)
-        limit = stoppable_speed_m_s(ahead, body, arbiter.clearance_m, arbiter.cautious_velocity_m_s)
+    """Return the speed from which a robot stops before what was lost or is remembered ahead, m/s, and why."""
+    body, arbiter = settings.body, settings.behaviors.arbiter
     to_wall_m = unheard.presumed_way_m(pose, body.radius_m + PASSAGE_M)
-    at_wall = math.sqrt(2.0 * body.acceleration_max_m_s2 * to_wall_m)
-    return (at_wall, LOST) if at_wall < limit else (limit, reason)
+    limits = [(math.sqrt(2.0 * body.acceleration_max_m_s2 * to_wall_m), LOST)]
+    remembered = unheard.remembered.ahead(pose, body.radius_m + arbiter.clearance_m)
+    for places, reason in ((unheard.points(), UNHEARD), (remembered, REMEMBERED)):
+        if len(places):
+            ahead = Percept(pose, places, percept.field_of_view)
+            speed = stoppable_speed_m_s(ahead, body, arbiter.clearance_m, arbiter.cautious_velocity_m_s)
+            limits.append((speed, reason))
+    return min(limits)

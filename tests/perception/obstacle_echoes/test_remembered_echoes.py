@@ -10,6 +10,7 @@ import pytest
 from drivers.messages import Firing, Floats, Pose
 from perception.obstacle_echoes.fresh_echoes import FreshEchoes
 from perception.obstacle_echoes.remembered_echoes import HEARS_S, ONE_PLACE_M, REMEMBERED_PLACES, REMEMBERED_S
+from perception.obstacle_echoes.unheard_echoes import ALONE
 from perception.sensor_mounts import ring_pose
 from perception.snapshot import put_back, snapshot_of
 
@@ -82,7 +83,28 @@ def test_the_silence_of_a_sensor_that_hears_does() -> None:
 def test_what_falls_silent_before_a_ring_that_stands_has_left(moved_m: float) -> None:
     drive = heard_behind()
     drive.fire(SILENT, yaw=math.pi, x=moved_m)
+    assert drive.ahead() == [(1.2, 0.0)], "it may have missed it"
+    drive.fire(SILENT, yaw=math.pi, x=moved_m)
     assert drive.ahead() == [(1.2, 0.0)] * (moved_m > 0.0)
+
+
+def test_a_clock_that_leaps_back_leaves_it() -> None:
+    drive = heard_behind()
+    drive.t -= 0.6
+    drive.fire(SILENT)
+    assert drive.ahead() == [(1.2, 0.0)]
+    drive.fire(SILENT, steps=round(10.0 * REMEMBERED_S))
+    assert drive.ahead() == []
+
+
+def test_a_stop_before_what_a_silent_ring_heard_leaves_the_rest() -> None:
+    drive = heard_behind()
+    unheard = drive.ring.unheard
+    for echo in unheard.records:
+        echo.state, echo.is_steady, echo.x = ALONE, 1, 1.0
+    unheard.silences[:] = 1000
+    assert unheard.take_ahead(AHEAD, 2.0, 0.5) == pytest.approx(1.0)
+    assert drive.ahead() == [(1.2, 0.0)]
 
 
 @pytest.mark.parametrize(("sensor_of", "left"), [((), 1), ((0,) * COUNT, 0)])
