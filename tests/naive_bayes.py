@@ -111,37 +111,6 @@ def look(w: Array, place: Array) -> Look:
     return Look(d, (u * w[:, 2:4]).sum(1), u)
 
 
-def either_way(lead: float, prior: float) -> float:
-    """Return the log ratio of both ways of answering to the first, by the lead and the log odds of the other."""
-    return float(np.logaddexp(0.0, lead + prior) - np.logaddexp(0.0, prior))
-
-
-def edge_lead_of_circle(
-    w: Array, centre: Array, rho: float, cosines: tuple[float, float, float], gate: float, miss: float, short: float,
-    noise: Noise,
-) -> float:  # fmt: skip
-    """Return the lead of what the beams' edges meet of a circle whose centre is past them."""
-    opt, half, inside = (math.acos(cosine) for cosine in cosines)
-    seen = look(w, centre)
-    lead = 0.0
-    for j in range(len(w)):
-        d, off = seen.d[j], math.acos(min(1.0, max(-1.0, seen.cos[j])))
-        past = off - half
-        gap = half + past - math.asin(min(1.0, rho / d))
-        if past <= 0.0 or gap > opt:
-            continue
-        r = d * math.cos(past) - math.sqrt(max(0.0, rho**2 - (d * math.sin(past)) ** 2))
-        for sign, e, angle in ((1.0, w[j, 4] - r, gap), (-1.0, w[j, 4] - d + rho, off)):
-            v = 0.0
-            if abs(e) >= gate and angle <= inside:
-                v = miss if e > 0.0 else short
-            elif abs(e) < gate and angle <= opt:
-                v = float(evidence(noise, w[j : j + 1, 4], np.array([e]))[0])
-                v = max(v, 0.0) if angle > half else v
-            lead += sign * v
-    return lead
-
-
 def score_circle(
     w: Array, centre: Array, rho: float, cosines: tuple[float, float, float], gate: float, miss: float, short: float,
     noise: Noise,

@@ -104,7 +104,6 @@ def reset_circle(track: CircleTrack) -> None:
     track.alternative = 0
     track.other_rays = 0
     track.rays_leads[:] = 0.0
-    track.edge_lead = 0.0
     track.is_named = 0
     track.radius = 0.0
     track.root_xx = 0.0

@@ -7,9 +7,6 @@ estimated (`perception.bayes.circles.heard_rays`). Of several rays the one neare
 
 A body that a ray misses by an angle counts as that far outside the beam, so that what holds for a beam's edge (a
 reading near it may be answered, one well inside must) holds for rays as well.
-
-Where everything answers, a body past a beam is heard from where the beam's edge meets it. That is a second way for
-all readings of a body, and counts where circles are compared with each other (`either_way`).
 """
 
 from __future__ import annotations
@@ -18,24 +15,14 @@ import math
 from typing import Final
 
 from perception.bayes.inference.cross_path import LENGTH_MIN_M, circle_error, is_crossed
-from perception.bayes.inference.likelihood import level_of, log_likelihood
 from perception.bayes.memory.elements import Reading
-from perception.bayes.memory.scratch import Predictions
 from perception.bayes.memory.settings_record import Settings
-from perception.bayes.memory.state import ESTABLISHED, RAYS_MAX, CircleTrack, State
+from perception.bayes.memory.state import RAYS_MAX, State
 from perception.kernel import kernel
 from perception.records import Records
 
 GRAZING_MIN: Final = 0.2
 """Least cosine of incidence by which a range is derived: beyond it the range's slope has no bound."""
-
-EDGE_PRIOR_NAT: Final = -4.6
-"""Log prior odds (a hundredth) that bodies past a beam answer from its edge as well. With a tenth, drums that are
-heard as mirrors are named .1 to .2 ft later."""
-EDGE_LEAD_MAX_NAT: Final = 10.0
-"""Most that one circle says for or against it, so that no wrong one decides for all."""
-EDGES: Final = 2
-"""Rays that are the beam's two edges."""
 
 
 @kernel
@@ -99,78 +86,6 @@ def ray_over_circle(
     c, sn = math.cos(half_angle), math.sin(half_angle)
     ahead = c * cos_past - sn * sin_past if sn * cos_past + c * sin_past > 0.0 else d
     return r, (dx - r * ux) * per_deep, (dy - r * uy) * per_deep, ahead
-
-
-@kernel
-def log_one_plus_exp(v: float) -> float:
-    """Return log(1 + exp(v)) of any v."""
-    return max(v, 0.0) + math.log1p(math.exp(-abs(v)))
-
-
-@kernel
-def either_way(lead: float, prior_nat: float) -> float:
-    """Return the log ratio (nat) of both ways of answering to nearest points, by the edges' lead and log odds."""
-    return log_one_plus_exp(lead + prior_nat) - log_one_plus_exp(prior_nat)
-
-
-@kernel
-def evidence_of_reading(q: Reading, e: float, d: float, ahead: float, p: Records[Settings], noise: int) -> float:
-    """Return what a reading says of a circle, nat; see `range_fit.score_circle`.
-
-    Parameters
-    ----------
-    q, p, noise
-        As for `range_fit.score_circle`.
-    e, d, ahead : float
-        The reading's error, the centre's distance, and how far ahead it counts, m.
-    """
-    if abs(e) < p[0].gate_m:
-        if ahead < p[0].cos_may_answer * d:
-            return 0.0
-        v = log_likelihood(p, level_of(p, noise, q.range_m), e)
-        return max(v, 0.0) if ahead < p[0].cos_half_angle * d else v
-    if ahead < p[0].cos_must_answer * d:
-        return 0.0
-    return float(p[0].missed_echo_nat if e > 0.0 else p[0].short_echo_nat)
-
-
-@kernel
-def edge_lead_of_circle(
-    readings: Records[Reading], cx: float, cy: float, radius: float, p: Records[Settings], noise: int,
-    predicted: Predictions,
-) -> float:  # fmt: skip
-    """Return how much likelier (nat) readings are if a circle past a beam answers from where its edge meets it.
-
-    Parameters
-    ----------
-    readings, cx, cy, radius, p, noise
-        As for `range_fit.score_circle`.
-    predicted : Predictions
-        What the circle predicts. Heard by rays it has no lead: the edges are rays then.
-    """
-    lead = 0.0
-    if predicted.rays > 0:
-        return lead
-    for j in range(len(readings)):
-        q = readings[j]
-        d, ahead = predicted.distance[j], predicted.ahead[j]
-        if ahead >= p[0].cos_half_angle * d or is_crossed(q):
-            continue
-        r, _, _, by_edge = ray_over_circle(q, cx - q.x, cy - q.y, d, radius, p[0].half_angle_rad, EDGES)
-        if by_edge >= p[0].cos_may_answer * d:
-            lead += evidence_of_reading(q, q.range_m - r, d, by_edge, p, noise)
-            lead -= evidence_of_reading(q, predicted.error[j], d, ahead, p, noise)
-    return lead
-
-
-@kernel
-def edge_nat_of(tracks: Records[CircleTrack], but: int) -> float:
-    """Return the log odds that beams' edges answer here, by what is usual and what the circles, but for one, say."""
-    nat = EDGE_PRIOR_NAT
-    for t in range(len(tracks)):
-        if t != but and tracks[t].status == ESTABLISHED:
-            nat += min(EDGE_LEAD_MAX_NAT, max(-EDGE_LEAD_MAX_NAT, tracks[t].edge_lead))
-    return nat
 
 
 @kernel

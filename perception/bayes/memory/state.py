@@ -196,8 +196,6 @@ class CircleTrack(Track):
     """Lead of a body of unknown outline, nat; 0 where it was not compared."""
     round_lead: Finite
     """Lead of a circle of unknown radius, nat; 0 where it was not compared."""
-    edge_lead: Finite
-    """How much likelier its readings are if it also answers where a beam's edge meets it, its centre past it, nat."""
     room_lead: Finite
     """Lead of the mapped walls and corners, nat."""
     sides: Annotated[int, up_to(BEARING_BINS)]

@@ -15,7 +15,7 @@ from perception.bayes.circles.heard_rays import compare_rays, decide_rays
 from perception.bayes.circles.lateral_search import search_across
 from perception.bayes.circles.outline_check import other_bodies, outline_lead, round_lead
 from perception.bayes.circles.posterior import posterior_circle
-from perception.bayes.inference.beam import assume_rays, edge_lead_of_circle, edge_nat_of, either_way
+from perception.bayes.inference.beam import assume_rays
 from perception.bayes.inference.likelihood import bounded_exp
 from perception.bayes.inference.lines import enter_line, is_in_wall
 from perception.bayes.inference.noise_estimation import add_residuals, noise_variance
@@ -174,9 +174,6 @@ def update_score(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
     track.near = said.near
     track.unknown_nat = p[0].unknown_nat * said.near
     track.dispersion = said.dispersion
-    track.edge_lead = edge_lead_of_circle(
-        scratch.readings[:n], track.x, track.y, track.radius, p, s[0].noise_level, scratch.own
-    )
     track.leads[track.kind] = 0.0
     beyond: float = max(0.0, said.closest - p[0].far_m)
     return p[0].model_prior_nat - p[0].far_nat_per_m * beyond
@@ -184,7 +181,7 @@ def update_score(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
 
 @kernel
 def change_kind(s: StateRecord, p: SettingsRecord, track: CircleTrack, k: int, evidence_nat: float) -> None:
-    """Change a track to another circle that explains it better, whose lead is known.
+    """Change a track to another circle that explains it better.
 
     Parameters
     ----------
@@ -200,10 +197,8 @@ def change_kind(s: StateRecord, p: SettingsRecord, track: CircleTrack, k: int, e
     track.x = s[0].scratch.circle_fit.x
     track.y = s[0].scratch.circle_fit.y
     track.radius = p[0].circles[k].radius_m
-    lead = track.leads[k]
     for z in range(p[0].circle_count + 2):
-        # A line and a corner are heard by nearest points alone.
-        track.leads[z] -= lead if z < p[0].circle_count else evidence_nat - track.log_likelihood_ratio
+        track.leads[z] += track.log_likelihood_ratio - evidence_nat
     track.kind = k
     track.leads[k] = 0.0
     track.outline_lead = 0.0
@@ -216,14 +211,11 @@ def change_kind(s: StateRecord, p: SettingsRecord, track: CircleTrack, k: int, e
 
 
 @kernel
-def compare_alternatives(
-    s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int, prior: float, edge_nat: float
-) -> bool:
+def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int, prior: float) -> bool:
     """Compare the next alternatives; return whether the track is still an object and not a line.
 
     `leads` holds the lead of each at its last comparison. (Log ratios of different ages cannot be compared: the
-    readings have changed in between.) Circles are compared with each other by both ways of answering, and with all
-    else by nearest points: what nearest points do not explain may be a wall's.
+    readings have changed in between.)
 
     Parameters
     ----------
@@ -231,8 +223,6 @@ def compare_alternatives(
         As for `locate_circle`.
     prior : float
         From `update_score`.
-    edge_nat : float
-        Log odds that beams' edges answer, by all other circles.
     """
     line, corner = p[0].circle_count, p[0].circle_count + 1
     var0, rel2 = noise_variance(s, p)
@@ -247,18 +237,14 @@ def compare_alternatives(
         circle = (track.x, track.y, track.radius)
         own_prior = prior if track.kind < p[0].model_count else 0.0
         if k < line:
-            radius = p[0].circles[k].radius_m
-            v = fit_other_circle(s, p, n, circle, bearing, radius, OTHER_FIT_STEPS)
-            at = scratch.circle_fit
-            edge_lead = edge_lead_of_circle(
-                scratch.readings[:n], at.x, at.y, radius, p, s[0].noise_level, scratch.predicted
+            v = fit_other_circle(s, p, n, circle, bearing, p[0].circles[k].radius_m, OTHER_FIT_STEPS)
+            track.leads[k] = v - track.log_likelihood_ratio
+            leads = (
+                v + (prior if k < p[0].model_count else 0.0)
+                > track.log_likelihood_ratio + own_prior + SWITCH_LEAD_NAT
             )
-            gain = either_way(edge_lead, edge_nat) - either_way(track.edge_lead, edge_nat)
-            track.leads[k] = v + gain - track.log_likelihood_ratio
-            leads = track.leads[k] + (prior if k < p[0].model_count else 0.0) > own_prior + SWITCH_LEAD_NAT
             if leads and may_become(s, track, k, v):
                 change_kind(s, p, track, k, v)
-                track.edge_lead = edge_lead
                 predict_circle(scratch.readings[:n], track.x, track.y, track.radius, scratch.own)
                 break
         elif k == line:
@@ -336,7 +322,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
         track.x = x  # Another body's echoes lead there.
         track.y = y
     prior = update_score(s, p, track, n)
-    if not compare_alternatives(s, p, track, n, prior, edge_nat_of(tracks, t)) and drop_track(track):
+    if not compare_alternatives(s, p, track, n, prior) and drop_track(track):
         return
     if s[0].rays > 0:
         compare_rays(s, p, track, n)

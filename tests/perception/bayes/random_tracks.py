@@ -167,22 +167,6 @@ def around(rng: np.random.Generator, n: int, centre: Floats, rho: float) -> Floa
     return np.column_stack([centre - d[:, None] * unit(bearing), unit(axis), r])
 
 
-def echoes_at_edges(to: Floats, radius: float) -> Floats:
-    """Return what a ring of 24 beams hears of a circle that it comes nearer to, each beam by its nearest point in it.
-
-    Place x, y, axis x, y and range rounded to .1 ft, of what hears it; shape (n, 5).
-    """
-    rows = []
-    for x in np.arange(-1.0, -0.25, 0.1):
-        towards, d = math.atan2(to[1], to[0] - x), math.hypot(to[0] - x, to[1])
-        for axis in 0.13 + 2.0 * np.pi * np.arange(24) / 24:
-            past = max(abs(math.remainder(towards - axis, math.tau)) - float(S.half_angle_rad), 0.0)
-            if past < math.asin(radius / d):
-                r = d * math.cos(past) - math.sqrt(radius**2 - (d * math.sin(past)) ** 2)
-                rows.append((x, 0.0, math.cos(axis), math.sin(axis), 0.03048 * round(r / 0.03048)))
-    return np.array(rows)
-
-
 def new_memory() -> Memory:
     """Return an empty memory for the shipped ring and a few circle tracks."""
     return Memory(SENSORS, TRACKS)

@@ -7,25 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.inference import beam, range_fit
-from perception.bayes.inference.prediction import predict_circle
-from perception.bayes.memory.scratch import CircleFit, Score
-from perception.bayes.memory.state import ESTABLISHED, RAYS_MAX, TENTATIVE, Memory
-from perception.kernel import Floats
-from tests import naive_bayes
-from tests.perception.bayes.random_tracks import (
-    COSINES,
-    SENSORS,
-    P,
-    S,
-    echoes_at_edges,
-    examples,
-    noises,
-    pair,
-    predictions,
-    readings_of,
-)
-from tests.perception.bayes.range_cases import one
+from perception.bayes.inference import beam
+from perception.bayes.memory.state import RAYS_MAX, Memory
+from tests.perception.bayes.random_tracks import SENSORS, P, examples, pair, readings_of
 
 
 def rays_of(axis: float, half_angle: float, rays: int) -> np.ndarray:
@@ -114,56 +98,3 @@ def test_the_scratch_is_heard_as_assumed() -> None:
     scratch = memory.s[0].scratch
     heard = (scratch.predicted, scratch.own, scratch.line_fit, *scratch.corner_fit.faces)
     assert all(it.rays == 3 and it.half_angle == P[0].half_angle_rad for it in heard)
-
-
-@pytest.mark.parametrize(("lead", "prior"), [(0.0, -4.6), (-900.0, 2.0), (900.0, -30.0), (3.0, 0.0)])
-def test_both_ways_of_answering_are_mixed(lead: float, prior: float) -> None:
-    assert beam.either_way(lead, prior) == pytest.approx(naive_bayes.either_way(lead, prior), abs=1e-12)
-
-
-def test_other_circles_say_whether_beams_edges_answer() -> None:
-    memory = Memory(SENSORS, 4)
-    for t, (status, lead) in enumerate(
-        [(ESTABLISHED, 3.0), (ESTABLISHED, -40.0), (TENTATIVE, 5.0), (ESTABLISHED, 2.0)]
-    ):
-        memory.tracks[t].status, memory.tracks[t].edge_lead = status, lead
-    assert beam.edge_nat_of(memory.tracks, 3) == beam.EDGE_PRIOR_NAT + 3.0 - beam.EDGE_LEAD_MAX_NAT
-
-
-@examples(100, 5000)
-def test_the_lead_of_beams_edges_equals_its_oracle(examples: int) -> None:
-    rng, predicted, moved = np.random.default_rng(42), predictions(), 0
-    for _ in range(examples):
-        level, radius, n = int(rng.integers(len(noises()))), rng.choice([0.0, 0.107, 0.3048, 0.67]), 40
-        d, off, axis = rng.uniform(0.8, 4.0, n), rng.uniform(-0.5, 0.5, n), rng.uniform(-3, 3, n)
-        past = np.clip(np.abs(off) - S.half_angle_rad, 0.0, np.arcsin(radius / d))
-        r = d * np.cos(past) - np.sqrt(np.maximum(radius**2 - (d * np.sin(past)) ** 2, 0.0)) + rng.normal(0, 0.05, n)
-        to = np.column_stack([d * np.cos(axis + off), d * np.sin(axis + off)])
-        centre = rng.uniform(-1, 1, 2)
-        w: Floats = np.column_stack([centre - to, np.cos(axis), np.sin(axis), np.where(rng.random(n) < 0.2, 1e6, r)])
-        predict_circle(readings_of(w), *pair(centre), radius, predicted)
-        lead = beam.edge_lead_of_circle(readings_of(w), *pair(centre), radius, P, level, predicted)
-        want = naive_bayes.edge_lead_of_circle(
-            w, centre, radius, COSINES, S.gate_m, S.missed_echo_nat, S.short_echo_nat, noises()[level]
-        )
-        assert lead == pytest.approx(want, rel=1e-9, abs=1e-9)
-        moved += lead != 0.0
-    assert moved > 0.6 * examples
-
-
-def test_a_drum_that_answers_at_beams_edges_is_no_barrel_farther_behind() -> None:
-    """Whose centre lies in more of the beams: by nearest points alone it leads by 11 nat."""
-    drum, radius, barrel_radius = np.array([0.0, 0.8]), 0.3048, 0.67056
-    rows = echoes_at_edges(drum, radius)
-    readings, predicted, (fit, barrel) = readings_of(rows), predictions(), one(CircleFit)
-    to = naive_bayes.look(rows, drum).u.sum(0)
-    start = (*pair(drum + (barrel_radius - radius) * to / np.hypot(*to)), barrel_radius)
-    assert range_fit.fit_circle(readings, start, P, 9.0, (8e-5, 0.0), 6, predicted, fit[0])
-    by_points, by_edges = [], []
-    for place, rho in ((pair(drum), radius), (pair(barrel[:2]), barrel_radius)):
-        said, fields = one(Score)
-        range_fit.score_circle(readings, *place, rho, P, 0, predicted, said[0])
-        by_points.append(fields[0])
-        by_edges.append(beam.edge_lead_of_circle(readings, *place, rho, P, 0, predicted))
-    assert by_points[1] > by_points[0] + 8.0
-    assert by_points[0] + by_edges[0] > by_points[1] + by_edges[1] + 40.0

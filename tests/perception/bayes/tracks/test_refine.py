@@ -18,7 +18,6 @@ from tests.perception.bayes.random_tracks import (
     P,
     S,
     around,
-    echoes_at_edges,
     examples,
     new_memory,
     pair,
@@ -119,19 +118,3 @@ def test_a_refinement_is_counted_and_its_result_determines_the_status(examples: 
             )  # fmt: skip
         outcomes[after] += 1
     assert min(outcomes.values()) > 0.03 * examples
-
-
-def test_a_drum_heard_at_beams_edges_is_called_no_barrel() -> None:
-    """Which explains its echoes better by nearest points alone, and was its name at .9999."""
-    memory, drum = new_memory(), np.array([0.0, 0.8])
-    track = memory.tracks[0]
-    track.status, track.kind, track.radius = TENTATIVE, len(RADII) - 1, RADII[-1]
-    track.x, track.y = pair(drum + np.array([0.1, RADII[-1] - RADII[0]]))
-    track.root_xx = track.root_yy = 0.05
-    for q in readings_of(echoes_at_edges(drum, float(RADII[0]))):
-        reservoir.keep_reading(track, float(track.x), float(track.y), q)
-    for _ in range(6):
-        refine.refine(memory.s, memory.tracks, P, 0)
-    assert (track.kind, track.status) == (0, ESTABLISHED)
-    assert (track.x, track.y) == pytest.approx(drum, abs=0.03)
-    assert track.edge_lead > SWITCH_LEAD_NAT
