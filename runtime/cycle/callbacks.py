@@ -13,9 +13,6 @@ CONSOLE_RECEIVE: Final = "console receive"
 CONSOLE_FRAME: Final = "console frame"
 CONSOLE_SEND: Final = "console send"
 VIEW: Final = "view"
-MAP_COPY: Final = "map copy"
-"""A copy of the map or of the whole state for the recording."""
-MAP_LOG: Final = "map log"
 CALLBACKS: Final = (
     LINE_OPENED,
     LINK_RECEIVE,
@@ -26,7 +23,5 @@ CALLBACKS: Final = (
     CONSOLE_FRAME,
     CONSOLE_SEND,
     VIEW,
-    MAP_COPY,
-    MAP_LOG,
 )
 """All of them."""

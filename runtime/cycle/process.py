@@ -23,7 +23,7 @@ from drivers.link import Link
 from drivers.messages import Firing, Twist
 from drivers.registry import line_options, make_driver
 from perception.edits import Edit, Evidence
-from runtime.cycle.callbacks import CALLBACKS, COLLECTION, LINE_LOST, LINE_OPENED, LINE_SEND, LINK_RECEIVE, MAP_LOG
+from runtime.cycle.callbacks import CALLBACKS, COLLECTION, LINE_LOST, LINE_OPENED, LINE_SEND, LINK_RECEIVE
 from runtime.cycle.connection import UNCONFIRMED_END, Connection
 from runtime.cycle.drive_inputs import DriveInputs
 from runtime.cycle.drive_requests import DriveInput
@@ -148,7 +148,7 @@ class RobotProcess:
         self._memory = MemoryPolicy(timed(COLLECTION, gc.collect))
         self._mode_log = ModeLog(log, self._notifier)
         self._object_log, self._line_log = ObjectLog(log), LineLog(log, line_messages)
-        self._look, self._alerts, self._stop = timed(MAP_LOG, self._object_log.look), Alerts(), asyncio.Event()
+        self._alerts, self._stop = Alerts(), asyncio.Event()
         self._request: Request | None = None
         self._is_request_valid = always_valid
         self._edits, self._drive_inputs = list[Edit](), DriveInputs()
@@ -279,7 +279,8 @@ class RobotProcess:
         """Run one cycle in the order of DESIGN.md: gather, step (which sends the command and refines), record."""
         mark = self.timing_monitor.mark
         self._apply_live_settings()
-        inputs = self._gather(now.run_s, now.host_s, self._scheduler.begin(now).echo_age_s)
+        start = self._scheduler.begin(now)
+        inputs = self._gather(now.run_s, now.host_s, start.echo_age_s)
         mark(Phase.GATHER)
         before = self._state.mode
         record = self._step(inputs, now, mark)
@@ -324,22 +325,21 @@ class RobotProcess:
 
     def _report(self, record: CycleRecord, before: ModeState, on_cycle: OnCycle | None) -> None:
         """Record and show the cycle, and log what is new about mode, sensors and odometry."""
-        received, run_s = record.inputs.received, record.inputs.run_s
-        self._mode_log.observe(self._state, before, run_s)
-        self._line_log.observe(record, self._driver, self._budget.flood(run_s))
-        if self._object_log.is_due(run_s, is_edited=bool(record.inputs.edits)):  # a look takes half a cycle
-            asyncio.get_running_loop().call_soon(self._look, self._state.perception, run_s)
-        for line in self._alerts.update(received, self._state, run_s):
+        received, on_firing = record.inputs.received, self._observers.on_firing
+        self._mode_log.observe(self._state, before, record.inputs.run_s)
+        self._line_log.observe(record, self._driver, self._budget.flood(record.inputs.run_s))
+        self._object_log.observe(self._state.perception, record.inputs.run_s, is_edited=bool(record.inputs.edits))
+        for line in self._alerts.update(received, self._state, record.inputs.run_s):
             self._log.warning(line)
         for line in self._alerts.recovered:
             self._log.info(line)
-        if (on_firing := self._observers.on_firing) is not None:
+        if on_firing is not None:
             for firing in received.firings:
                 on_firing(firing)
         if on_cycle is not None:
             on_cycle(record, self._state, self._scheduler.stats, self._driver)
         if record.inputs.fault is None:
-            self._notifier.alive(run_s)
+            self._notifier.alive(record.inputs.run_s)
 
     def _fail(self, error: Exception) -> None:
         """Halt before anything else, then enter FAULT, which is never left, and log the error."""

@@ -1,7 +1,7 @@
 """The recorder: the control loop's side of a recording, which queues each cycle's data for the writer's thread.
 
 Queueing is an append. Copies are made less often: the map once a second, the objects half a second later, and the
-whole state, as a keyframe, rarely. In a run they are made when the cycle has ended, of the state that it left.
+whole state, as a keyframe, rarely. The cycle's command is sent before any of this.
 """
 
 from __future__ import annotations
@@ -88,12 +88,6 @@ def run_info(settings: Settings, host_clock: Callable[[], float], *, emulated: b
         part=1,
         emulated=emulated,
     )
-
-
-def _moment(record: CycleRecord) -> tuple[float, float]:
-    """Return when a cycle began by the run's clock and by the host's; virtual time has no other clock."""
-    run_s, host_s = record.inputs.run_s, record.inputs.host_s
-    return run_s, run_s if host_s is None else host_s
 
 
 class Recorder:
@@ -222,15 +216,11 @@ class Recorder:
 
     def on_cycle(self, record: CycleRecord, state: State) -> None:
         """Record a cycle that has just left `state`, and the map, the objects or a keyframe if one is due."""
-        if self.put_cycle(record):
-            self.copy_map(record, state)
-
-    def put_cycle(self, record: CycleRecord) -> bool:
-        """Record a cycle; return whether a copy of what it left is due."""
-        run_s, host_s = _moment(record)
+        run_s, host_s = record.inputs.run_s, record.inputs.host_s
+        host_s = run_s if host_s is None else host_s  # virtual time has no other clock
         self._cycle = record.cycle
         if not self._on:
-            return False
+            return
         if self._is_starting:
             # The replay starts from the state that this cycle has left.
             self._is_starting, self._has_gap = False, True
@@ -238,21 +228,9 @@ class Recorder:
             self._put((CYCLE, host_s, run_s, record))
         if self._last_keyframe_run_s is None:
             self._last_keyframe_run_s = run_s
-        if record.cycle % self._write_cycles == 0:
-            self._writer.thread.wake()
-        in_second = record.cycle % self._snapshot_cycles
-        return in_second in {0, self._snapshot_cycles // 2} or self._is_keyframe_due(run_s)
-
-    def copy_map(self, record: CycleRecord, state: State) -> None:
-        """Record a keyframe, the map or the objects as a cycle left them, whichever is due.
-
-        Nothing is copied once `state` has moved on: a keyframe stays due.
-        """
-        if state.cycle != record.cycle or not self._on:
-            return
-        run_s, host_s = _moment(record)
+        is_due = self._has_gap or self._writer.wants_keyframe or run_s - self._last_keyframe_run_s >= self._keyframe_s
         perception, cycle = state.perception, record.cycle
-        if self._is_keyframe_due(run_s):
+        if is_due and not self._writer.thread.is_full:
             self._has_gap = self._writer.wants_keyframe = False
             self._last_keyframe_run_s = run_s
             snapshot = MapSnapshot(
@@ -269,11 +247,8 @@ class Recorder:
         elif cycle % self._snapshot_cycles == self._snapshot_cycles // 2:
             objects = MapSnapshot(cycle, objects=perception.near_objects())
             self._put((OBJECTS, host_s, run_s, objects))
-
-    def _is_keyframe_due(self, run_s: float) -> bool:
-        last_run_s = run_s if self._last_keyframe_run_s is None else self._last_keyframe_run_s
-        is_due = self._has_gap or self._writer.wants_keyframe or run_s - last_run_s >= self._keyframe_s
-        return is_due and not self._writer.thread.is_full
+        if cycle % self._write_cycles == 0:
+            self._writer.thread.wake()
 
     def on_bytes(self, direction: str, run_s: float, host_s: float, data: bytes) -> None:
         """Record bytes that have just been received or sent over the serial line, as the program sees it."""

@@ -63,14 +63,12 @@ class ObjectLog:
         self._sure: Mapping[int, DetectedObject] = MappingProxyType({})
         self._due_s = 0.0
 
-    def is_due(self, run_s: float, *, is_edited: bool) -> bool:
-        """Return whether to `look` at the map; what goes with an operator's edit of the map is not logged."""
+    def observe(self, perception: Perception, run_s: float, *, is_edited: bool) -> None:
+        """Look at the map if that is due; what goes with an operator's edit of the map is not logged."""
         if is_edited:
             self._sure, self._due_s = MappingProxyType({}), run_s
-        return not 0.0 <= self._due_s - run_s <= LOOK_S
-
-    def look(self, perception: Perception, run_s: float) -> None:
-        """Log each object that was sure at the last look and no longer is."""
+        if 0.0 <= self._due_s - run_s <= LOOK_S:
+            return
         self._due_s = run_s + LOOK_S
         now = (*perception.labelled_objects(), *perception.archived_objects())
         sure = {one.number: one for one in now if one.number is not None and _is_sure(one)}

@@ -15,7 +15,6 @@ import pytest
 from mcap.reader import NonSeekingReader, make_reader
 
 from config.errors import UserError
-from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import (
     BOOKMARK,
     BOOKMARK_WITHDRAWN,
@@ -35,7 +34,7 @@ from runtime.recording.channels import (
 from runtime.recording.folder_index import create_listed
 from runtime.recording.reader import open_recording
 from runtime.recording.recorder import Recorder
-from runtime.recording.schema import Cycle, Keyframe, LogLine, MapChange, Payload, SerialBytes
+from runtime.recording.schema import Cycle, LogLine, MapChange, Payload, SerialBytes
 from runtime.recording.storage import MEGABYTE, RotatingFolder, SingleFile, has_bookmark, is_pinned, pin_of
 from runtime.simulation.closed_loop import simulate
 from tests.recorded import SECONDS, entries_of, hall, record, until, verify_file
@@ -61,31 +60,6 @@ def test_a_recording_holds_everything_that_happened(run: Path) -> None:
         assert recording.settings == hall()
         assert len(list(recording.messages())) == len(entries)
         assert recording.finished
-
-
-@pytest.mark.compiled
-def test_no_copy_is_made_of_a_state_that_has_moved_on(tmp_path: Path) -> None:
-    """A keyframe stays due then: from one of a later state a replay would not give the same bits."""
-    path, settings, late = tmp_path / "x.mcap", hall(), list[int]()
-    assert settings.world is not None
-    with Recorder(settings, SingleFile(path), clock=lambda: 0.0) as recorder:
-
-        def on_state(cycle: CycleRecord, state: State, _start: Any) -> None:
-            if recorder.put_cycle(cycle):
-                if cycle.cycle % 40 < 20:
-                    late.append(cycle.cycle)
-                    state.cycle += 1
-                    recorder.copy_map(cycle, state)
-                    state.cycle -= 1
-                else:
-                    recorder.copy_map(cycle, state)
-
-        simulate(settings, settings.world, 0, 7.0, on_state=on_state)
-    keyframes = [decode(Keyframe, e.data).cycle for e in entries_of(path) if e.topic == KEYFRAME]
-    assert len(keyframes) == 3
-    assert not set(keyframes) & set(late)
-    assert any(k in late for k in range(keyframes[0])), "the copy was due before"
-    assert verify_file(path).first_difference is None
 
 
 @pytest.mark.compiled

@@ -79,7 +79,7 @@ async def run_process(
     from runtime.cli.terminal.keys import keys
     from runtime.cli.terminal.time_keys import TimeKeys, noting_what_waits
     from runtime.cli.terminal.view import after_each_cycle
-    from runtime.cycle.callbacks import MAP_COPY, VIEW
+    from runtime.cycle.callbacks import VIEW
     from runtime.cycle.process import RobotProcess
     from runtime.cycle.reloader import Reloader
     from runtime.support.kernel_loader import KernelLoader
@@ -104,7 +104,6 @@ async def run_process(
             preparation,
             line_messages,
         )
-        recording.copy_map = after_each_cycle(process.timing_monitor.timed(MAP_COPY, recording.copy_map))
         if view is not None:
             listeners.append(after_each_cycle(process.timing_monitor.timed(VIEW, view.on_cycle)))
         if preparation is not None:

@@ -43,11 +43,6 @@ class RunRecording:
         None without a ring log.
     is_requested : bool
         Whether the user named the file: then an incomplete file is an error of the command.
-
-    Attributes
-    ----------
-    copy_map : OnCycle
-        Copies the map or the state for the recording, called where that is due; a run delays it to the cycle's end.
     """
 
     def __init__(
@@ -56,7 +51,6 @@ class RunRecording:
         self._recorder = recorder
         self._ring_log = ring_log
         self._is_requested = is_requested
-        self.copy_map: OnCycle = lambda record, state, _stats, _driver: recorder.copy_map(record, state)
         self._notice: str | None = None
         self._reported: dict[Recorder | RingLogWriter, str | None] = {}
 
@@ -72,8 +66,7 @@ class RunRecording:
         writers = (recorder,) if ring_log is None else (ring_log, recorder)
 
         def on_cycle(record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
-            if recorder.put_cycle(record):
-                self.copy_map(record, state, stats, driver)
+            recorder.on_cycle(record, state)
             for writer in writers:
                 error = writer.last_error
                 if error != self._reported.get(writer):

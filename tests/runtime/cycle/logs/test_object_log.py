@@ -27,36 +27,31 @@ def logged() -> tuple[ObjectLog, list[dict[str, Any]]]:
     return ObjectLog(structlog.wrap_logger(None, processors=[keep])), lines
 
 
-def observe(log: ObjectLog, perception: Any, run_s: float, *, is_edited: bool = False) -> None:
-    if log.is_due(run_s, is_edited=is_edited):
-        log.look(perception, run_s)
-
-
 def seen(*objects: DetectedObject, archived: tuple[DetectedObject, ...] = ()) -> Any:
     return SimpleNamespace(labelled_objects=lambda: objects, archived_objects=lambda: archived)
 
 
 def test_what_was_sure_and_is_gone_is_logged_once_with_the_reason() -> None:
     log, lines = logged()
-    observe(log, seen(DRUM, WALL), 1.0)
-    observe(log, seen(), 1.0 + 0.5 * LOOK_S)
+    log.observe(seen(DRUM, WALL), 1.0, is_edited=False)
+    log.observe(seen(), 1.0 + 0.5 * LOOK_S, is_edited=False)
     assert lines == [], "the map is looked at every ten seconds"
     for k in range(1, 4):
-        observe(log, seen(WALL), 1.5 + k * LOOK_S)
+        log.observe(seen(WALL), 1.5 + k * LOOK_S, is_edited=False)
     (line,) = lines
     assert line["event"] == "object gone"
     assert line["object"] == "drum 3 at (1.00, 2.00) m"
     assert line["reason"] == NO_EVIDENCE
-    observe(log, seen(), 2.0 + 4.0 * LOOK_S)
+    log.observe(seen(), 2.0 + 4.0 * LOOK_S, is_edited=False)
     assert lines[-1]["object"] == "wall 7 at (2.00, 0.00) m, 4.0 m long"
 
 
 def test_what_is_left_behind_or_goes_with_an_edit_is_not_logged() -> None:
     log, lines = logged()
-    observe(log, seen(DRUM, WALL), 1.0)
-    observe(log, seen(WALL, archived=(DRUM,)), 20.0)
-    observe(log, seen(WALL), 25.0, is_edited=True)
-    observe(log, seen(WALL), 40.0)
+    log.observe(seen(DRUM, WALL), 1.0, is_edited=False)
+    log.observe(seen(WALL, archived=(DRUM,)), 20.0, is_edited=False)
+    log.observe(seen(WALL), 25.0, is_edited=True)
+    log.observe(seen(WALL), 40.0, is_edited=False)
     assert lines == []
 
 
@@ -79,5 +74,5 @@ def test_a_map_that_changes_at_every_look_does_not_fill_the_log() -> None:
     log, lines = logged()
     looks = 2000
     for k in range(looks):
-        observe(log, seen(*(replace(DRUM, number=10 * k + i) for i in range(5))), k * LOOK_S)
+        log.observe(seen(*(replace(DRUM, number=10 * k + i) for i in range(5))), k * LOOK_S, is_edited=False)
     assert len(lines) <= LINES_BURST + LINES_PER_S * looks * LOOK_S

@@ -123,9 +123,7 @@ async def test_a_run_without_a_cycle_keeps_its_reason_unless_it_ended_before_the
         settings=settings, log_status=SimpleNamespace(listeners=[], probe=None), clock=lambda: 0.0, reload=None,
         is_armed=False, seconds=None,
     )  # fmt: skip
-    recording: Any = SimpleNamespace(
-        observers=lambda on_cycle, _log: Observers(on_cycle), probe=None, copy_map=lambda *_: None
-    )
+    recording: Any = SimpleNamespace(observers=lambda on_cycle, _log: Observers(on_cycle), probe=None)
     parts: dict[str, Any] = {"control": None, "view": None, "recording": recording, "preparation": None}
     running = run_process(plan, structlog.get_logger(), **parts, line_messages=ROBOT_LINE)
     if reasons is not None:
