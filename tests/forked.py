@@ -238,9 +238,9 @@ class _Child:
             self._sender.send((self._index, DONE))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Send a report to the parent, but that of a passed setup or teardown, of which only the time is shown."""
+        """Send a report to the parent, but that of a passed setup or teardown of which nothing is shown."""
         config = self._session.config
-        options = config.option
-        if report.passed and report.when != "call" and options.durations is None and options.xmlpath is None:
+        is_timed = config.option.durations is not None or getattr(config.option, "xmlpath", None) is not None
+        if report.passed and report.when != "call" and not is_timed and not report.sections:
             return
         self._sender.send((self._index, config.hook.pytest_report_to_serializable(config=config, report=report)))

@@ -119,9 +119,11 @@ def bears_on_circle(
 
 
 @kernel
-def is_in_front(q: Reading, cx: float, cy: float, radius: float, p: SettingsRecord) -> bool:
+def is_in_front(q: Reading, cx: float, cy: float, radius: float, rays: int, p: SettingsRecord) -> bool:
     """Return whether an echo came from in front of a circle, by more than the gate; parameters as above."""
-    return bool(not is_crossed(q) and q.range_m < math.hypot(cx - q.x, cy - q.y) - radius - p[0].gate_m)
+    dx, dy = cx - q.x, cy - q.y
+    e, _ = answer(q, dx, dy, math.sqrt(dx * dx + dy * dy), radius, p[0].half_angle_rad, rays)
+    return bool(not is_crossed(q) and e < -p[0].gate_m)
 
 
 @kernel
@@ -160,7 +162,8 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
                 is_own = not is_elsewhere(tracks[owner], p, cx, cy, track.radius)
             if bears_on_circle(q, cx, cy, track.radius, s[0].rays, owner == UNEXPLAINED, is_own, p):
                 is_kept = i < m or (i + offset) % CROSS_EVERY == 0
-                if is_model and is_in_front(q, cx, cy, track.radius, p) and not has_room(track, cx, cy, q):
+                is_before = is_model and is_in_front(q, cx, cy, track.radius, s[0].rays, p)
+                if is_before and not has_room(track, cx, cy, q):
                     continue
                 if is_kept:
                     keep_reading(track, cx, cy, q)

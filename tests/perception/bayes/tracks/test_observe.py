@@ -88,18 +88,19 @@ def test_readings_go_to_the_circle_with_the_least_error_and_every_circle_they_be
     assert kept > 7 * examples
 
 
-@pytest.mark.parametrize(("kind", "status", "range_m", "entered"), [
-    (0, ESTABLISHED, 1.0, 0), (0, TENTATIVE, 1.0, 3), (1, ESTABLISHED, 1.0, 3), (0, ESTABLISHED, 3.0, 3),
-    (0, ESTABLISHED, 2.0, 3),
-], ids=["in front", "in front of what is tentative", "in front of a rival", "passed", "hit"])  # fmt: skip
+@pytest.mark.parametrize(("kind", "status", "y", "range_m", "rays", "entered"), [
+    (0, ESTABLISHED, 1e-3, 1.0, 0, 0), (0, TENTATIVE, 1e-3, 1.0, 0, 3), (1, ESTABLISHED, 1e-3, 1.0, 0, 3),
+    (0, ESTABLISHED, 1e-3, 3.0, 0, 3), (0, ESTABLISHED, 1e-3, 2.0, 0, 3), (0, ESTABLISHED, 0.24, 1.95, 1, 0),
+], ids=["in front", "of a tentative one", "of a rival", "passed", "hit", "of where a ray meets it"])  # fmt: skip
 def test_a_reading_that_ends_in_front_of_an_established_model_replaces_none(
-    kind: int, status: int, range_m: float, entered: int
+    kind: int, status: int, y: float, range_m: float, rays: int, entered: int
 ) -> None:
     memory = new_memory()
+    memory.s[0].rays = rays
     track, counts = memory.tracks[0], memory.circles["bins"]["count"][0]
     track.kind, track.status, track.radius = kind, status, S.circles[kind].radius_m
     track.x = 2.0 + track.radius
-    numbers(memory.state["scratch"]["fired"][0])[:1, :5] = (0.0, 1e-3, 1.0, 0.0, range_m)
+    numbers(memory.state["scratch"]["fired"][0])[:1, :5] = (0.0, y, 1.0, 0.0, range_m)
     memory.state["scratch"]["explained_by"][0, 0] = UNEXPLAINED
     for _ in range(BIN_CAPACITY):
         observe.keep_readings(memory.s, memory.tracks, P, 1)
