@@ -14,7 +14,7 @@ SILENCE_M: Final = 2.5
 SAME_ECHO_M: Final = 0.3
 """Echoes that differ by less than this come from the same place, m."""
 READING_M: Final = 0.1
-"""Readings of one sensor from poses nearer than this, in heading than `READING_RAD`, have the same error."""
+"""Readings of one sensor from places nearer than this have the same error, unless it has turned (`READING_RAD`)."""
 READING_RAD: Final = math.radians(6.0)
 """Difference of headings in `READING_M`."""
 SPACING_M: Final = 0.02

@@ -51,10 +51,10 @@ class RememberedEcho(Record):
 
 
 class LastHeard(Record):
-    """When one sensor heard its last echoes."""
+    """When one sensor heard its last echoes; of one on a servo `is_echo` is that of a bearing."""
 
     is_echo: Flag
-    """Whether its last look heard an echo."""
+    """Whether its last look there heard an echo."""
     has_heard: Flag
     t: Place
     """When it last heard two in succession, s: a single one may be random, or all that a broken sensor hears."""
@@ -170,8 +170,8 @@ def remember(
         if math.isnan(r):
             continue
         own, is_echo = last_heard[sensor_of[i]], r < reach
-        again = own.is_echo == is_echo
-        own.is_echo, own.t = 1 if is_echo else 0, min(own.t, t)
+        again = last_heard[i].is_echo == is_echo
+        last_heard[i].is_echo, own.t = 1 if is_echo else 0, min(own.t, t)
         if is_echo and again:
             own.has_heard, own.t = 1, t
         if is_echo and not agreed[i]:

@@ -23,7 +23,7 @@ RANGE_OR_NONE: Final = PLACE._replace(infinite=True)
 
 
 LOOKS_KEPT: Final = 16
-"""Looks of each sensor that are kept, `READING_M` or half a beam apart: a turn by 90°, or 1.6 m."""
+"""Looks of each sensor that are kept, `silence.LOOKS_APART_M` or half a beam apart: a turn by 90°, or 1.6 m."""
 
 
 class NeighbourCounts(Record):

@@ -19,7 +19,7 @@ from perception.angles import wrapped
 from perception.kernel import kernel
 from perception.records import Records
 from perception.sensor_faults.memory import LOOKS_KEPT, RingMemory, SensorLook, SensorMemory
-from perception.shared_numbers import READING_M, SAME_ECHO_M
+from perception.shared_numbers import SAME_ECHO_M
 
 DEAF_NAT: Final = math.log(1e8)
 """Evidence that names a sensor, nat: a day has some 10⁵ such looks of each of two dozen sensors."""
@@ -29,6 +29,8 @@ HEALTHY_LOOKS: Final = 10.0
 """Looks that stand for what is known of healthy sensors before a run."""
 HEALTHY_MISS_MIN: Final = 0.2
 """A healthy sensor misses no less than this: the looks at one object are alike."""
+LOOKS_APART_M: Final = 0.1
+"""A look that is nearer than this to the one before, and turned by less than a quarter of the beam, is not kept."""
 AGAIN_M: Final = 0.3
 """Looks that count are this far apart, or turned by a whole beam, as others are alike."""
 BESIDE_RAD: Final = math.radians(60.0)
@@ -119,7 +121,7 @@ def weigh_silence(
     if hears:
         c.deaf_looks, c.heard_looks = 0, c.looks_made
     last = c.looks[(c.looks_made - 1) % LOOKS_KEPT]
-    is_new = math.hypot(x - last.x, y - last.y) >= READING_M or abs(wrapped(axis - last.axis)) >= 0.5 * half_angle
+    is_new = math.hypot(x - last.x, y - last.y) >= LOOKS_APART_M or abs(wrapped(axis - last.axis)) >= 0.5 * half_angle
     if c.looks_made > 0 and not is_new:
         if hears and last.range_m < 0.0:
             last.range_m = r

@@ -28,9 +28,9 @@ UNHEARD: Final = (
     "until the ring hears it again, or something behind it; if this returns, check that the ring hears what is near"
 )
 REMEMBERED: Final = (
-    f"something was heard here in the last {REMEMBERED_S:.0f} s, and the sensors that look there now have heard "
-    f"nothing since: the robot drives slowly there until one of them hears anything, at most so long; if this "
-    f"returns, check that they hear (`echolocate ring-test`)"
+    f"something was heard ahead in the last {REMEMBERED_S:.0f} s, and hardly anything since by the sensors that look "
+    f"there now: the robot drives slowly there until one of them hears again, twice, and then nothing there, or "
+    f"something behind it, at most so long; if this returns, check that they hear (`echolocate ring-test`)"
 )
 
 

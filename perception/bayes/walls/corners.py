@@ -50,8 +50,8 @@ SAME_CORNER_M: Final = 0.2
 CORNER_ECHOES_MIN: Final = 3.0
 """Echoes of a sure corner, which must also outnumber its passes."""
 EDGE_SAME_M: Final = 0.3
-"""How far a point may lie from the end of a span that is its own, and from a corner or an edge that is known
-better."""
+"""A point this near to the end of a span is its own, and one this near to a corner or an edge that is known better
+is that one."""
 EDGE_OFF_M: Final = 0.1
 """Greatest distance of an edge from its wall's line."""
 EDGE_ECHOES_MIN: Final = 4.0

@@ -16,10 +16,13 @@ from perception.bounds import COUNT, FINITE, Finite, Flag, Place
 from perception.kernel import Floats, kernel
 from perception.records import Record, Records
 
-OF_ODOMETRY, OF_OTHER, SCALES = range(2, 5)
-"""Unknowns beside the poses. The first two are of odometry: shares by which way and turns are longer than by it.
-Those of matches follow: shares by which one with the map before, and one with another, has lost way, because what
-comes into view fits less well."""
+SCALES: Final = 4
+"""Unknowns beside the poses: shares by which way and turns are longer than by odometry, and by which a match with the
+map before, and one with another, has lost way, because what comes into view fits less well."""
+OF_ODOMETRY: Final = 2
+"""The first so many of them are odometry's."""
+OF_OTHER: Final = 3
+"""The one of matches with another map than the one before."""
 GRAPH_SCALE_SIGMAS: Final = (0.03, 0.03, 0.01, 0.01)
 """Standard deviation of each before any match. What a match may lose and the scale of odometry look alike along a
 way: with 0.03 for both, half of an odometry that is 3 % long counted as lost, and the error at the end of drives out

@@ -162,7 +162,6 @@ def run_evidence(
         It is too large.
     """
     from perception.mapping.grid.evidence_grid import EvidenceGrid
-    # X
 
     cells = 2 ** math.ceil(math.log2(max(32.0, float((high - low).max()) / CELL_M + 1.0)))
     if cells > CELLS_MAX:

@@ -88,6 +88,16 @@ def test_what_falls_silent_before_a_ring_that_stands_has_left(moved_m: float) ->
     assert drive.ahead() == [(1.2, 0.0)] * (moved_m > 0.0)
 
 
+def test_a_servo_misses_an_echo_at_one_bearing_and_not_at_the_next() -> None:
+    drive = Drive((0,) * COUNT)
+    at = np.where(np.arange(COUNT) == 12, 1.0, math.nan)
+    drive.fire(at, yaw=math.pi, steps=3)
+    for misses in (1, 2):
+        drive.fire(np.where(np.arange(COUNT) == 6, 1.0, math.nan), yaw=math.pi)
+        drive.fire(np.where(np.isnan(at), math.nan, math.inf), yaw=math.pi)
+        assert len(drive.ahead()) == (misses == 1)
+
+
 def test_a_clock_that_leaps_back_leaves_it() -> None:
     drive = heard_behind()
     drive.t -= 0.6
