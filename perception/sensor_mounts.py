@@ -23,6 +23,14 @@ SensorPose: TypeAlias = tuple[float, float, float]
 """The same of a sensor."""
 
 
+@kernel
+def sensor_pose(mounts: Floats, i: int, pose: RingPose) -> SensorPose:
+    """Return where sensor `i` of a ring is, and its direction; `mounts` as of `mounts_array`."""
+    x, y, yaw = pose
+    c, s = math.cos(yaw), math.sin(yaw)
+    return x + c * mounts[i, 0] - s * mounts[i, 1], y + s * mounts[i, 0] + c * mounts[i, 1], yaw + mounts[i, 2]
+
+
 def ring_pose(firing: Firing) -> RingPose:
     """Return where the ring was at a firing, and its direction."""
     return float(firing.pose.x), float(firing.pose.y), float(firing.ring_yaw)

@@ -23,7 +23,7 @@ from perception.angles import wrapped
 from perception.bounds import CONSTANT, Bound, Flag, Place, bounds
 from perception.kernel import Floats, kernel
 from perception.records import Record, Records, records, zeros
-from perception.sensor_mounts import mounts_at
+from perception.sensor_mounts import mounts_at, sensor_pose
 from perception.shared_numbers import ROUNDING
 
 TURN_DIRECTIONS: Final = 36
@@ -142,13 +142,11 @@ def enter_looks(
     walls : (`TURN_DIRECTIONS`,) records
         What is remembered. Updated.
     """
-    c, s = math.cos(yaw), math.sin(yaw)
     for i in range(ranges.shape[0]):
         r = ranges[i]
         if math.isnan(r):
             continue
-        own_x, own_y = x + c * mounts[i, 0] - s * mounts[i, 1], y + s * mounts[i, 0] + c * mounts[i, 1]
-        axis = yaw + mounts[i, 2]
+        own_x, own_y, axis = sensor_pose(mounts, i, (x, y, yaw))
         for k in range(len(walls)):
             off = wrapped(k * WIDTH_RAD - axis)
             if abs(off) > half_angle + 0.5 * WIDTH_RAD:

@@ -37,7 +37,7 @@ from perception.obstacle_echoes.unheard_echoes import (
     lose_echo,
 )
 from perception.records import Records
-from perception.sensor_mounts import RingPose, mounts_at, ring_pose
+from perception.sensor_mounts import RingPose, mounts_at, ring_pose, sensor_pose
 from perception.shared_numbers import SAME_ECHO_M
 
 LOOKS_REMEMBERED: Final = 16
@@ -157,20 +157,17 @@ def record_echoes(
     unheard : (n,) records
         The echoes that a silence removed. Updated.
     """
-    x, y, yaw = pose
+    x, y, _ = pose
     points, bearings, times, heard, steady = kept
-    c = math.cos(yaw)
-    s = math.sin(yaw)
     for i in range(ranges.shape[0]):
         r = ranges[i]
         agreed[i] = False
         if math.isnan(r):
             continue
-        bearing = yaw + mounts[i, 2]
+        own_x, own_y, bearing = sensor_pose(mounts, i, pose)
         is_echo = math.isfinite(r)
         away = r if is_echo else 0.0
-        px = x + c * mounts[i, 0] - s * mounts[i, 1] + away * math.cos(bearing)
-        py = y + s * mounts[i, 0] + c * mounts[i, 1] + away * math.sin(bearing)
+        px, py = own_x + away * math.cos(bearing), own_y + away * math.sin(bearing)
         agreed[i] = is_echo and is_steady(kept, px, py, t)
         if r >= reach:
             for k in range(times.shape[1]):

@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.messages import Pose
-from perception.angles import SAME_RAD, wrapped
 from perception.bounds import CONSTANT, Flag, Place, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Record, Records, records, zeros
-from perception.sensor_mounts import RingPose
+from perception.sensor_mounts import RingPose, SensorPose, sensor_pose
 
 REMEMBERED_S: Final = 30.0
 """An echo is remembered for so long, s: a robot that turns away from what it hears is back at it within that."""
@@ -29,9 +28,9 @@ fallen silent, or nine of ten readings, and something had been touched, end with
 REMEMBERED_PLACES: Final = 64
 """Echoes that are remembered; the oldest makes room. In furnished rooms rings of 16 to 24 sensors keep up to 40."""
 ONE_PLACE_M: Final = 0.1
-"""Echoes that are nearer to each other are one, m."""
-STANDS_M: Final = 1e-3
-"""A sensor that has moved by less stands, m."""
+"""Echoes that are nearer to each other are one, m. With 0.3, two of those ten drives touch something."""
+HAS_MOVED_M: Final = 1e-3
+"""What is nearer or farther by this since a sensor looked last, or beside where it was, has moved, m."""
 
 
 class RememberedEcho(Record):
@@ -44,10 +43,9 @@ class RememberedEcho(Record):
     """Its place, m."""
     y: Place
     sensor: Annotated[int, index_of(256)]
-    """What heard it, and from where: m, m, rad."""
-    from_x: Place
-    from_y: Place
-    axis: Place
+    """What heard it last, on its axis."""
+    range_m: Place
+    """How far from there, m."""
 
 
 class LastHeard(Record):
@@ -55,21 +53,14 @@ class LastHeard(Record):
 
     is_echo: Flag
     """Whether its last look there heard an echo."""
-    has_heard: Flag
     t: Place
-    """When it last heard two in succession, s: a single one may be random, or all that a broken sensor hears."""
+    """When it last heard two in succession, s, 0 for never: a single one may be random, or all that a broken sensor
+    hears."""
 
 
 @kernel
-def is_from_there(one: RememberedEcho, x: float, y: float, axis: float) -> bool:
-    """Return whether an echo was heard from a place, m, in a direction, rad."""
-    stands = abs(one.from_x - x) + abs(one.from_y - y) < STANDS_M
-    return bool(stands and abs(wrapped(axis - one.axis)) < SAME_RAD)
-
-
-@kernel
-def enter_echo(x: float, y: float, sensor: int, place: RingPose, t: float, echoes: Records[RememberedEcho]) -> None:
-    """Enter an echo at x, y (m) that a sensor heard from a place (m, m, rad) at a time, s, for the oldest one."""
+def enter_echo(i: int, r: float, sensor: SensorPose, t: float, echoes: Records[RememberedEcho]) -> None:
+    """Enter an echo of sensor `i` at a range, m, heard from where it was at a time, s; the oldest one makes room."""
     free = 0
     for k in range(len(echoes)):
         if not echoes[k].is_kept:
@@ -77,14 +68,20 @@ def enter_echo(x: float, y: float, sensor: int, place: RingPose, t: float, echoe
             break
         if echoes[k].t < echoes[free].t:
             free = k
-    one = echoes[free]
-    one.is_kept, one.t, one.x, one.y, one.sensor = 1, t, x, y, sensor
-    one.from_x, one.from_y, one.axis = place
+    one, (x, y, axis) = echoes[free], sensor
+    one.is_kept, one.t, one.sensor, one.range_m = 1, t, i, r
+    one.x, one.y = x + r * math.cos(axis), y + r * math.sin(axis)
 
 
 @kernel
 def contradict_remembered(
-    i: int, r: float, place: RingPose, hears_s: float, reach: float, slope: float, echoes: Records[RememberedEcho]
+    i: int,
+    r: float,
+    sensor: SensorPose,
+    hears_s: float,
+    reach: float,
+    slope: float,
+    echoes: Records[RememberedEcho],
 ) -> None:
     """Forget the echoes that a reading contradicts.
 
@@ -94,8 +91,8 @@ def contradict_remembered(
         The sensor; −1 if it has just fallen silent, as of an echo that it misses now and then.
     r : float
         Its reading, m.
-    place : RingPose
-        Its place, m, and direction, rad.
+    sensor : SensorPose
+        Where it was.
     hears_s : float
         Its silence contradicts what was heard before this, s.
     reach : float
@@ -105,19 +102,20 @@ def contradict_remembered(
     echoes
         As for `remember`. Updated.
     """
-    x, y, axis = place
-    ux, uy = math.cos(axis), math.sin(axis)
+    x, y, axis = sensor
+    c, s = math.cos(axis), math.sin(axis)
     for k in range(len(echoes)):
         one = echoes[k]
         dx, dy = one.x - x, one.y - y
-        ahead, across = dx * ux + dy * uy, abs(dy * ux - dx * uy)
+        ahead, across = dx * c + dy * s, abs(dy * c - dx * s)
         if not one.is_kept or ahead <= 0.0:
             continue
-        is_seen = across < ahead * slope and ahead < min(r, reach)
+        is_seen = ahead < min(r, reach) and across < ahead * slope
         if r < reach:
             is_over = is_seen or (abs(ahead - r) < ONE_PLACE_M and across < ONE_PLACE_M)
         else:
-            is_over = (is_seen and one.t < hears_s) or (one.sensor == i and is_from_there(one, x, y, axis))
+            has_left = one.sensor == i and abs(ahead - one.range_m) < HAS_MOVED_M and across < HAS_MOVED_M
+            is_over = has_left or (is_seen and one.t < hears_s)
         if is_over:
             one.is_kept = 0
 
@@ -138,18 +136,10 @@ def remember(
 
     Parameters
     ----------
-    ranges : (n,) float
-        As in a `Firing`, m.
-    mounts : (n, 3) float
-        x, y (m), direction (rad) of each sensor in the ring's frame.
-    pose : RingPose
-        Place (m) and direction (rad) of the ring.
-    t : float
-        Time of the firing, s.
+    ranges, mounts, pose, t, agreed
+        As in `fresh_echoes.record_echoes`; only echoes with which another look agrees count.
     reception : (float, float, float)
         A sensor hears what is so near to its axis, rad, and up to so far away, m; radius of the ring, m.
-    agreed : (n,) bool
-        Whether another look agrees with the sensor's echo in this firing: only such echoes count.
     sensor_of : (n,) int
         As `config.robot.RingConfig.sensor_of`.
     echoes : (REMEMBERED_PLACES,) records
@@ -157,9 +147,8 @@ def remember(
     last_heard : (n,) records
         Of each sensor. Updated.
     """
-    x, y, yaw = pose
     core, reach, radius = reception
-    c, s, slope = math.cos(yaw), math.sin(yaw), math.tan(core)
+    x, y, _ = pose
     for k in range(len(echoes)):
         one = echoes[k]
         one.t = min(one.t, t)  # the robot's clock may leap back
@@ -171,17 +160,14 @@ def remember(
             continue
         own, is_echo = last_heard[sensor_of[i]], r < reach
         again = last_heard[i].is_echo == is_echo
-        last_heard[i].is_echo, own.t = 1 if is_echo else 0, min(own.t, t)
-        if is_echo and again:
-            own.has_heard, own.t = 1, t
+        last_heard[i].is_echo = 1 if is_echo else 0
+        own.t = t if is_echo and again else min(own.t, t)
         if is_echo and not agreed[i]:
             continue
-        axis = yaw + mounts[i, 2]
-        own_x, own_y = x + c * mounts[i, 0] - s * mounts[i, 1], y + s * mounts[i, 0] + c * mounts[i, 1]
-        place, hears_s = (own_x, own_y, axis), own.t - HEARS_S if own.has_heard else -math.inf
-        contradict_remembered(i if again else -1, r, place, hears_s, reach, slope, echoes)
+        sensor = sensor_pose(mounts, i, pose)
+        contradict_remembered(i if again else -1, r, sensor, own.t - HEARS_S, reach, math.tan(core), echoes)
         if is_echo:
-            enter_echo(own_x + r * math.cos(axis), own_y + r * math.sin(axis), i, place, t, echoes)
+            enter_echo(i, r, sensor, t, echoes)
 
 
 @kernel

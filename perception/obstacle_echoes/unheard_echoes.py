@@ -25,13 +25,11 @@ from drivers.messages import Pose
 from perception.bounds import COUNT, PLACE, Flag, Place, bounds, index_of
 from perception.kernel import Floats, Ints, kernel
 from perception.obstacle_echoes.blind_walls import TURN_DIRECTIONS, WIDTH_RAD, BlindWalls, middle_walls
-from perception.obstacle_echoes.remembered_echoes import RememberedEchoes
+from perception.obstacle_echoes.remembered_echoes import HAS_MOVED_M, RememberedEchoes
 from perception.records import Record, Records, records, zeros
-from perception.sensor_mounts import RingPose
+from perception.sensor_mounts import RingPose, SensorPose, sensor_pose
 from perception.shared_numbers import SAME_ECHO_M
 
-COME_NEARER_M: Final = 1e-3
-"""A robot that has come nearer by this since a sensor looked last has moved, m."""
 AWAY_M: Final = 0.1
 """A robot that is farther from an echo by this than where it was lost has had the chance to hear it again, m."""
 SILENT_ROUNDS: Final = 4
@@ -87,33 +85,30 @@ def lose_echo(c: UnheardEcho, px: float, py: float, is_steady: bool, x: float, y
         Place of the ring, m.
     """
     now = math.hypot(px - x, py - y)
-    state = ALONE if is_steady and now < math.hypot(px - c.ring_x, py - c.ring_y) - COME_NEARER_M else LEFT
+    state = ALONE if is_steady and now < math.hypot(px - c.ring_x, py - c.ring_y) - HAS_MOVED_M else LEFT
     if c.state < KEPT or (state == ALONE and now < math.hypot(c.x - x, c.y - y)):
         c.state, c.x, c.y, c.lost_m = state, px, py, now
         c.is_steady = 1 if is_steady else 0
 
 
 @kernel
-def reaches(r: float, mount: Floats, pose: RingPose, core: float, one: UnheardEcho) -> bool:
+def reaches(r: float, sensor: SensorPose, core: float, one: UnheardEcho) -> bool:
     """Return whether a sensor heard an echo from where a lost one stands, or from behind it.
 
     Parameters
     ----------
     r : float
         The range that it heard, m.
-    mount : (3,) float
-        x, y (m), direction (rad) of the sensor in the ring's frame.
-    pose, core
+    sensor : SensorPose
+        Where it was.
+    core
         As in `contradict_echoes`.
     one : record
         The lost echo.
     """
-    x, y, yaw = pose
-    c, s = math.cos(yaw), math.sin(yaw)
-    axis = yaw + mount[2]
-    own_x, own_y = x + c * mount[0] - s * mount[1], y + s * mount[0] + c * mount[1]
-    dx, dy = one.x - own_x, one.y - own_y
-    ahead, across = dx * math.cos(axis) + dy * math.sin(axis), abs(dy * math.cos(axis) - dx * math.sin(axis))
+    x, y, axis = sensor
+    dx, dy, c, s = one.x - x, one.y - y, math.cos(axis), math.sin(axis)
+    ahead, across = dx * c + dy * s, abs(dy * c - dx * s)
     return bool(0.0 < ahead < r + SAME_ECHO_M and across < ahead * math.tan(core))
 
 
@@ -155,7 +150,7 @@ def contradict_echoes(
         if not math.isnan(ranges[i]):
             r = ranges[i] if ranges[i] < reach else -1.0
             turned = math.hypot(mounts[i, 0], mounts[i, 1]) * abs(yaw - one.yaw)
-            has_moved = math.hypot(one.ring_x - x, one.ring_y - y) + turned > COME_NEARER_M
+            has_moved = math.hypot(one.ring_x - x, one.ring_y - y) + turned > HAS_MOVED_M
             silences[SILENT] += 1
             silences[UNCHANGED] += 1
             hears |= r >= 0.0
@@ -183,7 +178,7 @@ def contradict_echoes(
             continue
         one.state = KEPT if one.state >= KEPT else NOT_KEPT
         for i in range(ranges.shape[0]):
-            if ranges[i] < reach and agreed[i] and reaches(ranges[i], mounts[i], pose, core, one):
+            if ranges[i] < reach and agreed[i] and reaches(ranges[i], sensor_pose(mounts, i, pose), core, one):
                 one.state = NOT_KEPT
                 break
 

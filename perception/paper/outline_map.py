@@ -18,7 +18,7 @@ from perception.bounds import CONSTANT, COUNT, PLACE, bounds, index_of, up_to
 from perception.edits import Segments
 from perception.kernel import Floats, Ints, kernel
 from perception.paper.parameters import PINNED_SHARE_MAX
-from perception.sensor_mounts import RingPose, mounts_at, ring_pose
+from perception.sensor_mounts import RingPose, mounts_at, ring_pose, sensor_pose
 
 EMPTY, PRESENT, PINNED = range(3)
 """Values of `OutlineMap.status`."""
@@ -59,19 +59,14 @@ def erase_contradicted(
     int
         How many were removed.
     """
-    pose_x, pose_y, yaw = pose
     capacity = segments.shape[0]
-    c = math.cos(yaw)
-    s = math.sin(yaw)
     erased = 0
     for i in range(ranges.shape[0]):
         r = ranges[i]
         if not math.isfinite(r):
             continue
-        x = pose_x + c * mounts[i, 0] - s * mounts[i, 1]
-        y = pose_y + s * mounts[i, 0] + c * mounts[i, 1]
-        ax = math.cos(yaw + mounts[i, 2])
-        ay = math.sin(yaw + mounts[i, 2])
+        x, y, axis = sensor_pose(mounts, i, pose)
+        ax, ay = math.cos(axis), math.sin(axis)
         cos_half = math.cos(half_angle)
         for k in range(count):
             slot = (start + k) % capacity

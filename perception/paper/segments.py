@@ -18,7 +18,7 @@ from perception.bounds import CONSTANT, RANGE, Place, bounds, index_of, up_to
 from perception.kernel import Floats, kernel
 from perception.paper.parameters import READING_SPACING, SENSOR_READINGS_KEPT
 from perception.records import Record, Records, records, zeros
-from perception.sensor_mounts import RingPose, mounts_array, mounts_at, ring_pose
+from perception.sensor_mounts import RingPose, mounts_array, mounts_at, ring_pose, sensor_pose
 
 
 class KeptReading(Record):
@@ -128,18 +128,13 @@ def pair_readings(
     int
         How many segments were written to `out`.
     """
-    pose_x, pose_y, yaw = pose
     baseline_min, baseline_max, gap_max, spacing = apart
     count = 0
-    c = math.cos(yaw)
-    s = math.sin(yaw)
     for i in range(ranges.shape[0]):
         r = ranges[i]
         if not math.isfinite(r):
             continue
-        x = pose_x + c * mounts[i, 0] - s * mounts[i, 1]
-        y = pose_y + s * mounts[i, 0] + c * mounts[i, 1]
-        axis = yaw + mounts[i, 2]
+        x, y, axis = sensor_pose(mounts, i, pose)
         sensor = sensors[i]
         if sensor.count > 0:
             last = sensor.kept[sensor.newest]

@@ -42,7 +42,7 @@ from perception.ring_faults.repeats import (
 )
 from perception.ring_faults.replays import PAST_LOOKS, PastLooks, weigh_replay
 from perception.sensor_faults.wall import NOISE_SHARE
-from perception.sensor_mounts import RingPose
+from perception.sensor_mounts import RingPose, sensor_pose
 
 CHANGE_NAT: Final = math.log(3e5 / 0.002)
 """`EVIDENCE_NAT` for changes from one round of the firing pattern to the next, of which a day has 3·10⁵, nat."""
@@ -270,15 +270,12 @@ def check_motion(
         all_of.travel_rad = math.atan2(y - all_of.y, x - all_of.x)
         all_of.path_m += moved
     all_of.x, all_of.y = x, y
-    c, s = math.cos(yaw), math.sin(yaw)
     replayed = 0.0
     for i in range(ranges.shape[0]):
         if math.isnan(ranges[i]):
             continue
         r = ranges[i] if ranges[i] < reach - tolerance else NO_ECHO_M
-        own_x = x + c * mounts[i, 0] - s * mounts[i, 1]
-        own_y = y + s * mounts[i, 0] + c * mounts[i, 1]
-        axis = yaw + mounts[i, 2]
+        own_x, own_y, axis = sensor_pose(mounts, i, pose)
         is_ahead = math.cos(axis - all_of.travel_rad) > AHEAD_COS
         then = echoes[i].latest
         echoes[i].is_compared = echoes[i].is_known

@@ -59,7 +59,7 @@ WARM_UP: Final = "runtime.support.kernel_warmup"
 KERNEL_COUNTS: Final = MappingProxyType(
     {
         RING: 89,
-        BAYES: 257,
+        BAYES: 254,
         POLYGONS: 66,
         PAPER: 7,
         LOCALIZATION: 26,

@@ -3,7 +3,7 @@
 Hits and silences share the bins, so that new silences replace the hits of an object that has gone, for each bearing
 from which the robot observes it again. No reading is dropped for its age. Readings of one bearing never replace those
 of another, because a position needs readings from many bearings. What ended in front of an established model says
-little of it, and takes free places only (`has_room`): from afar, among furniture, most readings do.
+little of it, and takes free places only: from afar, among furniture, most readings do.
 
 Cross paths come eight at a time and would fill a circle's bins with the last decimetre, so that one in a few is kept
 there, for good. All circles share one memory of the others, of the last metre or two, and each takes those that it
@@ -45,15 +45,10 @@ def copy_reading(source: Reading, target: Reading) -> None:
 
 
 @kernel
-def bin_of(track: CircleTrack | PolygonTrack, cx: float, cy: float, reading: Reading) -> int:
-    """Return the bearing bin of a reading; the parameters are those of `keep_reading`."""
-    bins = len(track.bins)
-    return int((math.atan2(reading.y - cy, reading.x - cx) / math.tau + 0.5) * bins) % bins
-
-
-@kernel
-def keep_reading(track: CircleTrack | PolygonTrack, cx: float, cy: float, reading: Reading) -> None:
-    """Put a reading into a track's reservoir; it replaces the oldest reading of a full bearing bin.
+def keep_reading(
+    track: CircleTrack | PolygonTrack, cx: float, cy: float, reading: Reading, replaces: bool = True
+) -> bool:  # fmt: skip
+    """Put a reading into a track's reservoir, for the oldest one of a full bearing bin; return whether it is there.
 
     Parameters
     ----------
@@ -63,17 +58,17 @@ def keep_reading(track: CircleTrack | PolygonTrack, cx: float, cy: float, readin
         The object's centre, m.
     reading : Reading
         Copied.
+    replaces : bool
+        Whether it may take the place of another one.
     """
-    bin_ = track.bins[bin_of(track, cx, cy, reading)]
-    copy_reading(reading, bin_.readings[bin_.count % len(bin_.readings)])
-    bin_.count += 1
-
-
-@kernel
-def has_room(track: CircleTrack, cx: float, cy: float, reading: Reading) -> bool:
-    """Return whether a reading's bearing bin is not full; the parameters are those of `keep_reading`."""
-    bin_ = track.bins[bin_of(track, cx, cy, reading)]
-    return bool(bin_.count < len(bin_.readings))
+    bins = track.bins
+    b = int((math.atan2(reading.y - cy, reading.x - cx) / math.tau + 0.5) * len(bins)) % len(bins)
+    readings = bins[b].readings
+    if not replaces and bins[b].count >= len(readings):
+        return False
+    copy_reading(reading, readings[bins[b].count % len(readings)])
+    bins[b].count += 1
+    return True
 
 
 @kernel

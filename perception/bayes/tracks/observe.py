@@ -14,7 +14,7 @@ from perception.bayes.inference.lines import update_lines
 from perception.bayes.inference.noise_estimation import add_roughness, choose_noise, noise_variance, tolerance_m
 from perception.bayes.inference.occlusion import is_elsewhere
 from perception.bayes.inference.placement import COORDINATE_MAX_M, place_readings
-from perception.bayes.inference.reservoir import copy_reading, has_room, keep_reading
+from perception.bayes.inference.reservoir import copy_reading, keep_reading
 from perception.bayes.memory.elements import CROSS_EVERY, CROSS_HISTORY, HISTORY, Reading
 from perception.bayes.memory.parameters import (
     ASSOCIATION_MARGIN_M,
@@ -34,6 +34,9 @@ from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
 from perception.sensor_mounts import RingPose
 from perception.shared_numbers import CERTAIN_PROBABILITY, FAR
+
+NO_EVIDENCE, IN_FRONT, BEARS = range(3)
+"""What a reading says of a circle: nothing, that something else is before it, or more."""
 
 
 @kernel
@@ -80,8 +83,8 @@ def associate_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m
 @kernel
 def bears_on_circle(
     q: Reading, cx: float, cy: float, radius: float, rays: int, is_free: bool, is_own: bool, p: SettingsRecord
-) -> bool:  # fmt: skip
-    """Return whether a reading is evidence for or against a circle.
+) -> int:  # fmt: skip
+    """Return whether a reading is evidence for or against a circle, `BEARS`, or only that something is `IN_FRONT`.
 
     Parameters
     ----------
@@ -100,30 +103,22 @@ def bears_on_circle(
     dy = cy - q.y
     dot = dx * q.axis_x + dy * q.axis_y
     if dot <= 0.0:
-        return False
+        return NO_EVIDENCE
     d = math.sqrt(dx * dx + dy * dy)
     if rays == 0 and dot < p[0].cos_may_answer * d - KEEPING_MARGIN_M:
-        return False
+        return NO_EVIDENCE
     if is_crossed(q) and not is_near_circle(q, d, radius, p[0].gate_m):
-        return False
+        return NO_EVIDENCE
     e, dot = answer(q, dx, dy, d, radius, p[0].half_angle_rad, rays)
     if dot < p[0].cos_may_answer * d - KEEPING_MARGIN_M:
-        return False
+        return NO_EVIDENCE
     if is_crossed(q) and abs(e) > p[0].gate_m:
-        return False
+        return NO_EVIDENCE
     if e < -p[0].gate_m:
-        return is_free and dot >= p[0].cos_must_answer * d
+        return IN_FRONT if is_free and dot >= p[0].cos_must_answer * d else NO_EVIDENCE
     if e > p[0].gate_m:
-        return dot >= p[0].cos_must_answer * d and d <= p[0].pair_range_max_m
-    return is_own
-
-
-@kernel
-def is_in_front(q: Reading, cx: float, cy: float, radius: float, rays: int, p: SettingsRecord) -> bool:
-    """Return whether an echo came from in front of a circle, by more than the gate; parameters as above."""
-    dx, dy = cx - q.x, cy - q.y
-    e, _ = answer(q, dx, dy, math.sqrt(dx * dx + dy * dy), radius, p[0].half_angle_rad, rays)
-    return bool(not is_crossed(q) and e < -p[0].gate_m)
+        return BEARS if dot >= p[0].cos_must_answer * d and d <= p[0].pair_range_max_m else NO_EVIDENCE
+    return BEARS if is_own else NO_EVIDENCE
 
 
 @kernel
@@ -160,13 +155,11 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
             is_own = owner in (UNEXPLAINED, t) or (owner < 0 and track.status != TENTATIVE)
             if 0 <= owner < len(tracks) and not is_own:  # a part of the same body answered
                 is_own = not is_elsewhere(tracks[owner], p, cx, cy, track.radius)
-            if bears_on_circle(q, cx, cy, track.radius, s[0].rays, owner == UNEXPLAINED, is_own, p):
+            says = bears_on_circle(q, cx, cy, track.radius, s[0].rays, owner == UNEXPLAINED, is_own, p)
+            if says != NO_EVIDENCE:
                 is_kept = i < m or (i + offset) % CROSS_EVERY == 0
-                is_before = is_model and is_in_front(q, cx, cy, track.radius, s[0].rays, p)
-                if is_before and not has_room(track, cx, cy, q):
+                if is_kept and not keep_reading(track, cx, cy, q, not is_model or says == BEARS):
                     continue
-                if is_kept:
-                    keep_reading(track, cx, cy, q)
                 if is_kept or not is_sure:
                     track.unseen += 1
                 track.idle_firings = 0

@@ -56,6 +56,7 @@ from perception.mapping.grid.window import (
     rows_within,
     set_edges,
 )
+from perception.sensor_mounts import sensor_pose
 from perception.shared_numbers import PASSED_M
 
 DIRECTED_ARC_SIGMAS: Final = 1.5
@@ -222,22 +223,17 @@ def enter_readings(
         Updated.
     """
     corner, cell_m = raster
-    x, y, yaw = beams.pose
     ranges, mounts, bearings, half_angle = beams.ranges, beams.mounts, beams.bearings, beams.half_angle
     rounding_m, silence_m, mirrors = known
     arc, shares, draws, edges = scratch
     mask = planes.shape[1] - 1
-    c = math.cos(yaw)
-    s = math.sin(yaw)
     m = 0
     for i in range(ranges.shape[0]):
         r = ranges[i]
         if math.isnan(r):
             continue
         is_echo = math.isfinite(r)
-        sx = x + c * mounts[i, 0] - s * mounts[i, 1]
-        sy = y + s * mounts[i, 0] + c * mounts[i, 1]
-        axis = yaw + mounts[i, 2]
+        sx, sy, axis = sensor_pose(mounts, i, beams.pose)
         set_edges(axis, half_angle, edges)
         sigma = max(SPREAD_CELLS * cell_m, rounding_m, SPREAD_RELATIVE * r) if is_echo else 0.0
         passed = r - sigma if is_echo else silence_m

@@ -40,7 +40,7 @@ from perception.mapping.grid.window import (
     rows_within,
     set_edges,
 )
-from perception.sensor_mounts import SensorPose
+from perception.sensor_mounts import SensorPose, sensor_pose
 from perception.shared_numbers import PASSED_M
 
 LOCATED_RAD: Final = 0.07
@@ -189,19 +189,14 @@ def enter_sights(
         these there are at all, and how many echoes something explains. Updated.
     """
     _, cell_m = raster
-    x, y, yaw = beams.pose
     ranges, mounts, bearings, half_angle = beams.ranges, beams.mounts, beams.bearings, beams.half_angle
     mask = holds.shape[0] - 1
     sine = math.sin(half_angle)
-    c = math.cos(yaw)
-    s = math.sin(yaw)
     for i in range(ranges.shape[0]):
         r = ranges[i]
         if not math.isfinite(r):
             continue
-        sx = x + c * mounts[i, 0] - s * mounts[i, 1]
-        sy = y + s * mounts[i, 0] + c * mounts[i, 1]
-        axis = yaw + mounts[i, 2]
+        sx, sy, axis = sensor_pose(mounts, i, beams.pose)
         ux = math.cos(axis)
         uy = math.sin(axis)
         sigma = max(SPREAD_CELLS * cell_m, SPREAD_RELATIVE * r)
