@@ -57,8 +57,8 @@ class Method(Protocol):
         """Return what has a label and was left behind; the same tuple until it changes."""
         ...
 
-    def locate_echoes(self, bearings: Floats) -> None:
-        """Write where in its beam each echo of the last firing came from.
+    def locate_echoes(self, bearings: Floats) -> bool:
+        """Write where in its beam each echo of the last firing came from; return whether walls are known as mirrors.
 
         Parameters
         ----------

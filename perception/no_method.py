@@ -64,8 +64,9 @@ class NoMethod:
         """Return None: there are no objects."""
         return None
 
-    def locate_echoes(self, bearings: Floats) -> None:
-        """Write nothing: there are no objects."""
+    def locate_echoes(self, _bearings: Floats) -> bool:
+        """Write nothing and return False: there are no objects."""
+        return False
 
     def shift_object(self, number: int, dx: float, dy: float) -> None:
         """Move nothing: there are no objects."""

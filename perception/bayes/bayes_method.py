@@ -269,10 +269,10 @@ class BayesPerception:
             self._archived_labels = (*models, *other_circles(others, self.memory, self.settings, least, ()))
         return self._archived_labels
 
-    def locate_echoes(self, bearings: Floats) -> None:
+    def locate_echoes(self, bearings: Floats) -> bool:
         """Write where in its beam each echo of the last firing came from; see `Method.locate_echoes`."""
         sure = self._config.report_probability
-        locate_echoes(self.memory.s, self.memory.tracks, self.settings, self._readings, sure, bearings)
+        return locate_echoes(self.memory.s, self.memory.tracks, self.settings, self._readings, sure, bearings)
 
     def segment_geometry(self) -> Floats:
         """Return the mapped segments: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""

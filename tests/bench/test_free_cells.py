@@ -5,17 +5,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
-from bench.free_cells import beams_of, echoes_of, reachable, with_late_strays
-from bench.trials.furnished_rooms import furnished_room
+from bench.free_cells import STEP_M, beams_of, echoes_of, reachable, with_late_strays
+from bench.trials.furnished_rooms import ACOUSTICS, furnished_room
 from bench.trials.wall_trials import listen
 from config.load import load_settings
 from config.world import WallConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
 from drivers.messages import Firing, Pose
 from perception.mapping.grid.window import Ring
+from perception.pipeline import Perception
 from perception.sensor_mounts import mounts_array
-from runtime.analysis.export.occupancy_image import FREE, RESOLUTION_M, occupancy_image
+from runtime.analysis.export.occupancy_image import FREE, FREE_MAX, RESOLUTION_M, occupancy_image
+from runtime.simulation.open_loop import perceive
 
 SETTINGS = load_settings("hallway")
 RING = Ring(
@@ -33,6 +36,24 @@ def test_sound_reaches_what_no_wall_hides() -> None:
     beams = beams_of([Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, ranges)], RING)
     cells = np.array([(1.5, 0.0), (2.5, 0.0), (1.5, 1.5), (-1.5, 0.0), (30.0, 0.0)])
     assert reachable(cells, 0.05, beams, RING, compile_scene(world)).tolist() == [True, False, False, False, False]
+
+
+@pytest.mark.compiled
+def test_in_a_bare_square_room_of_mirrors_nothing_behind_the_walls_is_free() -> None:
+    """Its cells are heard from many sides, as where everything echoes: 22 % of what was called free lay outside."""
+    room = furnished_room(6315, ACOUSTICS)
+    firings = listen(SETTINGS.ring, room, 6315, STEP_M).firings
+    config = load_settings("hallway", ["perception.grid.method=directed"]).perception
+    perception = Perception(SETTINGS.ring, SETTINGS.models, config)
+    for firing in firings:
+        perceive(perception, firing)
+    window = perception.occupancy()
+    assert window is not None
+    rows, columns = np.nonzero(window.occupied <= FREE_MAX)
+    free = np.array([window.x_m, window.y_m]) + (np.column_stack([columns, rows]) + 0.5) * window.cell_m
+    can = reachable(free, window.cell_m, beams_of(firings, RING), RING, compile_scene(room.world))
+    assert len(free) > 1000
+    assert can.mean() > 0.99
 
 
 def test_little_that_sound_could_not_reach_is_free_in_the_image_though_nothing_was_recognised() -> None:

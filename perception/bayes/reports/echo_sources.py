@@ -1,4 +1,4 @@
-"""Where in its beam an echo came from, if an object or a wall that is sure explains it: for the evidence grid."""
+"""Where in its beam an echo came from, if an object, a wall or a corner that is sure explains it: for the grid."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.scratch import POLYGON
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CircleTracks, PolygonTrack, StateRecord
+from perception.bayes.memory.wall_records import RoomCorner
 from perception.bayes.walls.contact import (
     FOOT,
+    are_mirrors,
     contact,
+    corner_of,
     edge_direction,
     explaining_wall,
     is_on_straight_span,
     wall_normal,
 )
+from perception.bayes.walls.corners import CORNER_ECHOES_MIN
 from perception.kernel import Floats, kernel
 from perception.shared_numbers import FAR
 
@@ -54,8 +58,16 @@ def bearing_of_polygon(q: Reading, track: PolygonTrack, p: SettingsRecord) -> fl
 
 
 @kernel
-def locate_echoes(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int, sure: float, out: Floats) -> None:
+def is_sure_corner(corner: RoomCorner) -> bool:
+    """Return whether a corner was heard more often than ranges passed it, and often enough to be sure of it."""
+    return bool(corner.echoes >= CORNER_ECHOES_MIN and corner.echoes > corner.passes)
+
+
+@kernel
+def locate_echoes(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int, sure: float, out: Floats) -> bool:
     """Write the bearing of each fired reading's contact, NaN where nothing that is sure explains it.
+
+    Return whether the walls are known to be mirrors.
 
     Parameters
     ----------
@@ -86,4 +98,9 @@ def locate_echoes(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
                     if kind != FOOT:
                         nx, ny = edge_direction(q, nx, ny, p)
                     bearing = bearing_of(q, nx, ny, p)
+                else:
+                    c = corner_of(room, q, p)
+                    if c >= 0 and is_sure_corner(room.corners[c]):
+                        bearing = bearing_of(q, room.corners[c].x - q.x, room.corners[c].y - q.y, p)
         out[s[0].scratch.fired_sensors[i]] = bearing
+    return are_mirrors(room)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from config.robot import RingConfig
 from config.settings import GridConfig
 from drivers.messages import Firing
-from perception.bounds import COUNT, PLACE, bounds
+from perception.bounds import COUNT, FLAG, PLACE, bounds
 from perception.kernel import Floats
 from perception.mapping.grid.sight_lines import SightLines
 from perception.mapping.grid.window import Ring, Window
@@ -102,7 +102,12 @@ class EvidenceGrid:
 
     SCRATCH: Final = ("ring",)
     BOUNDS: Final = bounds(
-        _way_m=PLACE, _at=PLACE._replace(nan=True), _heard=COUNT, _firings=COUNT, bearings=PLACE._replace(nan=True)
+        _way_m=PLACE,
+        _at=PLACE._replace(nan=True),
+        _heard=COUNT,
+        _firings=COUNT,
+        _are_mirrors=FLAG,
+        bearings=PLACE._replace(nan=True),
     )
 
     def __init__(self, ring: RingConfig, config: GridConfig) -> None:
@@ -120,11 +125,12 @@ class EvidenceGrid:
         self._at = np.full(2, math.nan)
         self._heard = np.zeros(int(ring.range_max_m / HEARD_M) + 2, np.int64)
         self._firings = 0
+        self._are_mirrors = 0
         self.bearings: Floats = np.full(len(ring.mounts), math.nan)
         """Where in its beam each echo of the next firing came from, rad from the axis; NaN where unknown."""
 
-    def observe(self, firing: Firing) -> None:
-        """Enter a firing, which is given in the odometry's frame."""
+    def observe(self, firing: Firing, *, are_mirrors: bool = False) -> None:
+        """Enter a firing, which is given in the odometry's frame, and whether walls are known to be mirrors."""
         pose, ranges = firing.pose, firing.ranges_m
         moved = math.hypot(pose.x - self._at[0], pose.y - self._at[1])
         if math.isfinite(moved):
@@ -135,6 +141,7 @@ class EvidenceGrid:
         self.method.observe(firing, self.bearings, self.place, self.silence_m)
         self.sight_lines.observe(firing, self.bearings, self.place, self.method.holding())
         self._firings += 1
+        self._are_mirrors = int(are_mirrors)
 
     @property
     def place(self) -> int:
@@ -161,7 +168,7 @@ class EvidenceGrid:
         lines, holds = SightLines(self.window, self.ring), self.window.rolled(holding)
         for firing, bearings, place in firings:
             lines.observe(firing, bearings, place, holds)
-        return lines.crossed(self.method.mirrors, self.sight_lines.trust)
+        return lines.crossed(self.mirrors, self.sight_lines.trust)
 
     @property
     def silence_m(self) -> float:
@@ -171,6 +178,14 @@ class EvidenceGrid:
             return 0.0
         farthest = int(np.searchsorted(self._heard.cumsum(), HEARD_SHARE * total))
         return min(self.ring.reach_m, HEARD_M * (farthest + 1))
+
+    @property
+    def mirrors(self) -> float:
+        """How far this is a place of mirrors, 0 to 1: by the recognised walls, and until these are known by cells.
+
+        In a bare square room cells are heard from many sides, though no slanting wall answers.
+        """
+        return 1.0 if self._are_mirrors else self.method.mirrors
 
     @property
     def firings(self) -> int:
@@ -190,7 +205,7 @@ class EvidenceGrid:
         x, y = (cell_m * float(number) for number in self.window.corner)
         occupied = self.method.probability(seen_from)
         if seen_from is None:
-            np.maximum(occupied, EVEN, out=occupied, where=~self.sight_lines.crossed(self.method.mirrors))
+            np.maximum(occupied, EVEN, out=occupied, where=~self.sight_lines.crossed(self.mirrors))
         return OccupancyWindow(occupied, x, y, cell_m)
 
     def drop_caches(self) -> None:
@@ -202,6 +217,7 @@ class EvidenceGrid:
         self.method.clear()
         self.sight_lines.clear()
         self._heard[:] = 0
+        self._are_mirrors = 0
         self.bearings[:] = math.nan
         self._at[:] = math.nan
         self._way_m = 0.0

@@ -14,6 +14,7 @@ from perception.mapping.grid.directed import DirectedGrid
 from perception.mapping.grid.elfes import ElfesGrid
 from perception.mapping.grid.evidence_grid import HEARD_MIN, EvidenceGrid
 from perception.mapping.grid.moravec_elfes import MoravecElfesGrid
+from perception.mapping.grid.sight_lines import PLACES_MIN
 from perception.pipeline import Perception
 from perception.snapshot import snapshot_of
 from runtime.support.kernel_cache import GRIDS
@@ -64,6 +65,19 @@ def test_silence_shows_free_space_only_to_the_range_from_which_echoes_come() -> 
     assert grid.silence_m == pytest.approx(7.75)
     grid.clear()
     assert grid.silence_m == 0.0
+
+
+def test_among_walls_known_as_mirrors_no_beam_is_open_because_it_was_passed_often() -> None:
+    grid, ranges = make("directed"), np.full(SENSORS, math.nan)
+    ranges[0] = 3.0
+    free = {}
+    for are_mirrors in (False, True):
+        for k in range(2 * PLACES_MIN):
+            grid.observe(Firing(0.0, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges), are_mirrors=are_mirrors)
+        free[are_mirrors] = int((grid.occupancy().occupied < 0.4).sum())
+    assert grid.method.mirrors < 0.5, "the cells do not know"
+    assert free[False] > 50
+    assert free[True] == 0
 
 
 @pytest.mark.covered
