@@ -29,6 +29,8 @@ POLL_S: Final = 0.2
 
 PROGRESS_PERIOD_S: Final = 5.0
 """Time between two lines of the log on how far the preparation is, s."""
+RECOGNITION_READY: Final = "recognition is ready"
+"""Last line of the log on it."""
 
 
 class Preparation(Protocol):
@@ -148,6 +150,7 @@ class RunningPreparation:
                 self._task.result()
             finally:
                 is_over.set()
+            self._log.info(RECOGNITION_READY)
             return None
         progress = self._preparation.progress
         if run_s - self._logged_run_s >= PROGRESS_PERIOD_S:

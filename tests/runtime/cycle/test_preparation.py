@@ -20,7 +20,7 @@ from drivers.emulator.faults import Mute
 from runtime.cycle.drive_requests import NO_MAP, DriveRequest
 from runtime.cycle.inputs import Inputs, Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.preparation import RunningPreparation, fresh_state
+from runtime.cycle.preparation import RECOGNITION_READY, RunningPreparation, fresh_state
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, Refused, State, step
 from runtime.support.kernel_loader import InThread
@@ -135,7 +135,9 @@ def test_the_robot_drives_before_recognition_is_ready_and_goes_on_with_it(monkey
     assert sum(len(record.inputs.received.firings) for record in before) >= 0.8 * len(before)
     assert run.speeds[len(before) - 1] > 0.1
     assert {record.inputs.preparing for record in before} == {Preparation.progress}
-    assert [entry["event"] for entry in run.log.entries].count(Preparation.progress) == 1
+    events = [entry["event"] for entry in run.log.entries]
+    assert events.count(Preparation.progress) == events.count(RECOGNITION_READY) == 1
+    assert events.index(Preparation.progress) < events.index(RECOGNITION_READY)
     assert [record.cycle for record in run.cycles] == list(range(1, len(run.cycles) + 1))
     assert {record.segments for record in before} == {0}
     assert run.cycles[-1].segments > 0
