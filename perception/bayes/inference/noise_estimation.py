@@ -43,7 +43,9 @@ def tolerance_m(half_box: float, var: float) -> float:
 
 
 @kernel
-def add_roughness(a: Reading, b: Reading, c: Reading, age_s: float, p: Records[Settings], evidence: Floats) -> None:
+def add_roughness(
+    a: Reading, b: Reading, c: Reading, age_s: float, p: Records[Settings], evidence: Floats, is_moved: bool
+) -> None:
     """Add the evidence of three readings of one sensor for each noise.
 
     Parameters
@@ -56,6 +58,8 @@ def add_roughness(a: Reading, b: Reading, c: Reading, age_s: float, p: Records[S
         The noises.
     evidence : (NOISES,) float
         `State.roughness_nat`. Updated.
+    is_moved : bool
+        Whether readings are moved to where the ring jumped: then the ends of the ranges along the axis are compared.
     """
     if b.range_m >= FAR or c.range_m >= FAR or age_s > p[0].pair_gap_s:
         return
@@ -66,6 +70,9 @@ def add_roughness(a: Reading, b: Reading, c: Reading, age_s: float, p: Records[S
         return
     share = bc / ac
     e = b.range_m - share * a.range_m - (1.0 - share) * c.range_m
+    if is_moved:
+        e += b.axis_x * (b.x - share * a.x - (1.0 - share) * c.x)
+        e += b.axis_y * (b.y - share * a.y - (1.0 - share) * c.y)
     k = 1.0 + share * share + (1.0 - share) ** 2
     half_box = p[0].half_resolution_m
     for h in range(NOISES):

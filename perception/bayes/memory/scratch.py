@@ -198,6 +198,28 @@ class BearingErrors(Record):
     whitened: float
 
 
+class Pull(Record):
+    """What an echo of a wall says of the ring's shift."""
+
+    x: float
+    """Growth of its range with the shift along x."""
+    y: float
+    error: float
+    """Range less predicted, m."""
+    accuracy: float
+    """Inverse of that error's variance without the shift, m⁻²; 0 where no wall explains the echo."""
+
+
+class ShiftInformation(Record):
+    """What is known of the ring's shift: the sum of information (m⁻²), and of information times shift (m⁻¹)."""
+
+    xx: float
+    xy: float
+    yy: float
+    x: float
+    y: float
+
+
 class Scratch(Record):
     """Values that kernels overwrite before each use."""
 
@@ -210,6 +232,9 @@ class Scratch(Record):
     fired_sensors: Annotated[Ints, SENSORS_MAX]
     explained_by: Annotated[Ints, SENSORS_MAX]
     """Explanation of each fired reading; see `UNEXPLAINED`."""
+    pulls: Annotated[Records[Pull], SENSORS_MAX]
+    """Of each fired reading."""
+    shift: ShiftInformation
     near_recent: Annotated[Ints, RECENT_READINGS_MAX]
     """Places of the recent readings that may bear on a new wall."""
     near_readings: NearReadings

@@ -26,6 +26,8 @@ WALL_BIN_M: Final = 0.06
 """Width of a bin along a wall."""
 SPANS_MAX: Final = 6
 """Spans of one wall, with openings between them."""
+JITTERS: Final = 5
+"""Jitters of the pose that are compared."""
 CORNERS_MAX: Final = 24
 """Corners and, apart from them, edges at a time."""
 EDGES_MAX: Final = CORNERS_MAX
@@ -180,6 +182,20 @@ class Stop(Record):
     is_standing: Flag
 
 
+class PoseJitter(Record):
+    """How far poses jump from one firing to the next; see `walls.pose_jitter`."""
+
+    common_nat: Annotated[Floats, JITTERS, FINITE]
+    """Evidence of each jitter over none, where the readings of a firing share it."""
+    alone_nat: Annotated[Floats, JITTERS, FINITE]
+    """The same where each reading has an error of its own."""
+    level: Annotated[int, index_of(JITTERS)]
+    """The one that is assumed, 0: none."""
+    x: Place
+    y: Place
+    """Mean shift of the last firings: by it the walls are off where odometry has them, m."""
+
+
 class WallMap(Record):
     """The walls around the robot, their corners, and the readings from which new walls come."""
 
@@ -208,6 +224,7 @@ class WallMap(Record):
     """1 for each sensor that has one."""
     firings: Count
     stop: Stop
+    jitter: PoseJitter
     edge_echoes: Finite
     """Slanting walls that answered from the beam's edge."""
     edge_silences: Finite

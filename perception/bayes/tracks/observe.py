@@ -30,6 +30,7 @@ from perception.bayes.polygons.initiation import request_polygon
 from perception.bayes.segments.pairing import make_segments
 from perception.bayes.tracks.model_check import count_surroundings
 from perception.bayes.tracks.track_selection import is_waiting
+from perception.bayes.walls.pose_jitter import place_by_others
 from perception.kernel import Floats, Ints, kernel
 from perception.records import Records
 from perception.sensor_mounts import RingPose
@@ -193,6 +194,7 @@ def update_history(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> 
                 time_s - sensor.times_s[before],
                 p,
                 s[0].roughness_nat,
+                s[0].room.jitter.level > 0,
             )
         copy_reading(q, sensor.history[kept % HISTORY])
         sensor.times_s[kept % HISTORY] = time_s
@@ -282,6 +284,7 @@ def associate(
         count_surroundings(s, m, math.hypot(px - s[0].ring_x, py - s[0].ring_y))
         s[0].ring_x = px
         s[0].ring_y = py
+        place_by_others(s, p, m)
     associate_circles(s, tracks, p, m)
     return m
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -37,10 +39,15 @@ def test_evidence_from_roughness_equals_its_oracle(examples: int) -> None:
         q[:, 5] = rng.uniform(0, 40, 3)
         heard = rng.normal(0, 10, len(NOISES))
         q[0, 4] = min(q[0, 4], 5.0)  # the caller passes only echoes
-        want = naive_tracks.roughness(q[0], q[1], q[2], 40.0, S.pair_gap_s, S.half_resolution_m, NOISES, heard)
+        axis, is_moved = rng.uniform(-math.pi, math.pi), bool(rng.random() < 0.5)
+        q[:, 2:4] = math.cos(axis), math.sin(axis)
+        ends = q.copy()
+        ends[:, 4] += is_moved * ((q[:, :2] - q[1, :2]) * q[1, 2:4]).sum(axis=1)
+        half_box = S.half_resolution_m
+        want = naive_tracks.roughness(ends[0], ends[1], ends[2], 40.0, S.pair_gap_s, half_box, NOISES, heard)
         counted += want is not heard
         a, b, c = readings_of(q[:, :5])
-        noise_estimation.add_roughness(a, b, c, float(40.0 - q[2, 5]), P, heard)
+        noise_estimation.add_roughness(a, b, c, float(40.0 - q[2, 5]), P, heard, is_moved)
         assert heard == pytest.approx(want, rel=1e-12, abs=1e-12)
     assert counted > 0.33 * examples
 
