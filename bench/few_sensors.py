@@ -142,7 +142,9 @@ def run_room(
     corners = np.array([(wall.x1_m, wall.y1_m) for wall in world.wall])
     reach = (float(np.abs(corners[:, 0]).max()), float(np.abs(corners[:, 1]).max()))
     places = [space.place((i, j)) for i, j in np.argwhere(space.free).tolist()]
-    begin = max((place for place in places if _inside(place, corners)), key=lambda place: math.hypot(*place))
+    inside = sorted((place for place in places if _inside(place, corners)), key=lambda place: -math.hypot(*place))
+    # A small robot also has room within a box, where no way leads out.
+    begin = next(place for place in inside if next_goal(np.random.default_rng(seed), space, place, reach) is not None)
     start = StartConfig(x_m=begin[0], y_m=begin[1], heading_deg=float(rng.uniform(-180.0, 180.0)))
     world = world.model_copy(update={"start": start})
     device, driver = make_device(settings, world, seed), make_driver(settings)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from behaviors.move_to_goal import Goal
 from bench.few_sensors import (
     AWAY_M,
     few_sensors_table,
@@ -21,6 +22,7 @@ from bench.trials.navigation_trials import closed_room_m
 from bench.trials.shortest_way import free_space
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.scene import compile_scene
+from runtime.cycle.drive_requests import DriveRequest
 
 
 def test_goals_lie_far_away_and_are_free() -> None:
@@ -51,6 +53,13 @@ def test_a_drive_is_counted() -> None:
     assert result.arrived >= 1
     assert result.way_m > 15.0
     assert few_sensors_table([result]).row_count == 1
+
+
+def test_a_small_robot_does_not_begin_within_a_box() -> None:
+    """No way led out of it, and no goal was counted, reached or missed."""
+    requests = list[DriveRequest]()
+    run_room("hobby3", "cone", 8600, 0.5, lambda _, state, __: requests.append(state.drive_request))
+    assert isinstance(requests[-1], Goal)
 
 
 @pytest.mark.soak
