@@ -10,9 +10,9 @@ can only be compared with how it moves. An honest ring among objects that stand 
 - *Missing.* Readings do not depend on what is there: known echoes are silent all at once, or elsewhere, as random
   ranges are. How often an honest ring misses a known echo is learned on the way.
 - *Turned.* The ranges change as they would on a ring that is mounted turned by 90°, 180° or 270°
-  (`perception.ring_faults.mounting`). `EXCLUDED_NAT` of evidence exclude such a mounting until the odometry is
-  reset; before, it limits the speed beside what would be ahead, and `DOUBTED_NAT` of evidence for it everywhere. A
-  corridor does not tell a half turn.
+  (`perception.ring_faults.mounting`, of a sensor on a servo `perception.ring_faults.servo_mounting`). `EXCLUDED_NAT`
+  of evidence exclude such a mounting until the odometry is reset; before, it limits the speed beside what would be
+  ahead, and `DOUBTED_NAT` of evidence for it everywhere. A corridor does not tell a half turn.
 - *Changed.* All readings change at once from one round of the firing pattern to the next, by a change that the
   sensors have in common (`perception.ring_faults.changes`).
 - *Exchanged.* What a sensor hears is what others heard where another one looks, or behind it; or it hears nothing of
@@ -52,13 +52,14 @@ from perception.ring_faults.motion_tests import (
 )
 from perception.ring_faults.mounting import DOUBTED_NAT, EXCLUDED_NAT, possible_places
 from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS, PastLooks
+from perception.ring_faults.servo_mounting import LOOK_DIRECTIONS, DirectionTrace, forget_directions
 from perception.ring_faults.wiring import LOOK_FIELDS, LOOKS, SENSORS_MAX, Wiring, weigh_turn, weigh_wiring
 from perception.sensor_faults.monitor import TOLERANCE_MIN_M, TOLERANCE_STEPS
 from perception.sensor_mounts import mounts_array, ring_pose, turn_mounts
 
 _TURNED: Final = (
     "the ranges change as if the ring were mounted turned by {} against the robot file: check how it is mounted, "
-    "its cables and the order of its sensors, then re-arm"
+    "its cables and the order of its sensors, or how the arm sits on its servo, then re-arm"
 )
 _CHANGED: Final = (
     "the readings of the whole ring changed at once, as no motion changes them: {}; check the ring's power, cables "
@@ -137,6 +138,7 @@ class RingMonitor:
         "_near",
         "_turn_nat",
         "_places",
+        "_direction_records",
     )
     """Not part of a snapshot: views of arrays that are, or overwritten before each use."""
     BOUNDS: Final = bounds(
@@ -144,7 +146,6 @@ class RingMonitor:
         _turning=CONSTANT,
         _turns=CONSTANT,
         _half_angle=CONSTANT,
-        _on_servo=CONSTANT,
         _tolerance=CONSTANT,
         _reach_m=CONSTANT,
         _past=PLACE,
@@ -152,6 +153,7 @@ class RingMonitor:
         _replayed_nat=POSITIVE,
         _echoes=EchoTrace.BOUNDS,
         _ring=RingTrace.BOUNDS,
+        _directions=DirectionTrace.BOUNDS,
         _turned_looks=PLACE,
         _turned_counts=COUNT,
         _exchanged_nat=FINITE,
@@ -164,13 +166,15 @@ class RingMonitor:
         self._turning = np.isin(np.arange(len(ring.mounts)), ring.turning)
         self._turns = bool(ring.turning)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
-        self._on_servo = ring.has_servo
         self._tolerance = max(TOLERANCE_STEPS * ring.resolution_m, TOLERANCE_MIN_M)
         self._reach_m = ring.window_m
         self._echoes = zeros(EchoTrace, len(ring.mounts))
         self._echo_records = records(EchoTrace, self._echoes)
         self._ring = zeros(RingTrace, 1)
         self._ring_records = records(RingTrace, self._ring)
+        self._directions = zeros(DirectionTrace, LOOK_DIRECTIONS if ring.has_servo else 0)
+        self._direction_records = records(DirectionTrace, self._directions)
+        forget_directions(self._direction_records)
         self._expected = records(Expected, zeros(Expected, len(ring.mounts)))
         self._past = np.zeros((len(ring.mounts), PAST_LOOKS, PAST_FIELDS))
         self._looks = np.zeros(len(ring.mounts), np.int64)
@@ -202,6 +206,7 @@ class RingMonitor:
             self._ring_records,
             self._expected,
             self._past_looks,
+            self._direction_records,
         )
         wired = weigh_wiring(firing.ranges_m, pose, mounts, reception, self._wiring, self._near, WIRING_NAT)
         if wired >= 0 and self.judge_turn():  # all looks together know better which pair it is
@@ -238,12 +243,7 @@ class RingMonitor:
         return None if found == NOTHING else REASONS[found]
 
     def possible_obstacles(self) -> Floats:
-        """Return where the last echoes came from if the ring is turned, as far as that is not excluded: (k, 2), m.
-
-        One sensor on a servo looks in each direction too seldom to exclude it, and nothing is returned.
-        """
-        if self._on_servo:
-            return self._places[:0]
+        """Return where the last echoes came from if the ring is turned, as far as that is not excluded: (k, 2), m."""
         found = possible_places(self._mounts, self._echo_records, self._ring_records, self._places)
         return self._places[:found]
 
@@ -261,6 +261,8 @@ class RingMonitor:
         """Start again after the odometry was reset."""
         self._echoes[...] = np.zeros((), self._echoes.dtype)
         self._ring[...] = np.zeros((), self._ring.dtype)
+        self._directions[...] = np.zeros((), self._directions.dtype)
+        forget_directions(self._direction_records)
         self._looks[:] = 0
         self._replayed_nat[:] = 0.0
         self._turned_counts[:] = 0

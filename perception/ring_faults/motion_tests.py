@@ -41,6 +41,7 @@ from perception.ring_faults.repeats import (
     weigh_repeat,
 )
 from perception.ring_faults.replays import PAST_LOOKS, PastLooks, weigh_replay
+from perception.ring_faults.servo_mounting import DirectionTrace, forget_directions, weigh_direction
 from perception.sensor_faults.wall import NOISE_SHARE
 from perception.sensor_mounts import RingPose, sensor_pose
 
@@ -221,6 +222,14 @@ def begin_evidence(all_of: RingTrace) -> None:
 
 
 @kernel
+def forget_echoes(echoes: Records[EchoTrace]) -> None:
+    """Drop what each sensor heard."""
+    for i in range(len(echoes)):
+        echoes[i].is_known = echoes[i].is_compared = echoes[i].is_anchored = echoes[i].agreed = 0
+        echoes[i].heard.range_m = echoes[i].agreed_m = NO_ECHO_M
+
+
+@kernel
 def check_motion(
     ranges: Floats,
     pose: RingPose,
@@ -230,6 +239,7 @@ def check_motion(
     ring: Records[RingTrace],
     expected: Records[Expected],
     past: PastLooks,
+    directions: Records[DirectionTrace],
 ) -> int:
     """Test the readings of a firing; return what is wrong, `NOTHING` where nothing is.
 
@@ -251,6 +261,8 @@ def check_motion(
         Overwritten.
     past : PastLooks
         As for `replays.weigh_replay`. Updated.
+    directions : (LOOK_DIRECTIONS,) records
+        Of a ring with a servo, what was heard last from each direction; else none. Updated.
     """
     x, y, yaw = pose
     half_angle, tolerance, reach = reception
@@ -263,9 +275,8 @@ def check_motion(
         begin_evidence(all_of)
         past.replayed_nat[:] = 0.0
         past.counts[:] = 0
-        for i in range(len(echoes)):
-            echoes[i].is_known = echoes[i].is_compared = echoes[i].is_anchored = echoes[i].agreed = 0
-            echoes[i].heard.range_m = echoes[i].agreed_m = NO_ECHO_M
+        forget_directions(directions)
+        forget_echoes(echoes)
     elif moved > 0.0:
         all_of.travel_rad = math.atan2(y - all_of.y, x - all_of.x)
         all_of.path_m += moved
@@ -288,7 +299,9 @@ def check_motion(
         nats = weigh_replay(i, look, heard_before, reception, past)
         replayed = max(replayed, nats)
         weigh_look(i, look, is_ahead, reception, echoes, all_of)
-        if r >= 0.0:
+        if len(directions) > 0:
+            weigh_direction(look, mounts, reception, directions, all_of)
+        elif r >= 0.0:
             weigh_change(i, look, yaw, mounts, reception, echoes, all_of)
     found = REPEATED if replayed >= REPLAY_NAT else conclusion(all_of)
     if found == NOTHING:

@@ -60,6 +60,40 @@ cotangent of the angle. With .5 honest rings that wind by up to ±20° show 3 na
 
 
 @kernel
+def surfaces_heard(sensors: int, half_angle: float) -> float:
+    """Return by what the evidence of one change is divided: sensors whose beams overlap hear the same surface."""
+    return ALIKE * max(1.0, sensors * half_angle / math.pi)
+
+
+@kernel
+def anything_density(moved: float, error: float) -> float:
+    """Return the density of a change of range that follows nothing, 1/m."""
+    return 1.0 / (2.0 * (MOVES * moved + error))
+
+
+@kernel
+def change_density(angle: float, change: float, moved: float, error: float, half_angle: float) -> float:
+    """Return the density of a change of range, 1/m, of an echo within the beam of a sensor.
+
+    Parameters
+    ----------
+    angle : float
+        From the motion to the sensor's axis, rad.
+    change : float
+        By how much the range has grown, m.
+    moved, error : float
+        By how much the sensor has moved, and the error of the change, m.
+    half_angle : float
+        Half the beam's width, rad.
+    """
+    angle = abs(wrapped(angle))
+    most = -moved * math.cos(max(0.0, angle - half_angle)) - error
+    least = -moved * math.cos(min(math.pi, angle + half_angle)) + error
+    follows = FOLLOWS / (least - most) if most <= change <= least else 0.0
+    return (1.0 - FOLLOWS) * anything_density(moved, error) + follows
+
+
+@kernel
 def weigh_change(
     i: int,
     look: Look,
@@ -103,17 +137,14 @@ def weigh_change(
     change, path = r - c.anchor.range_m, math.atan2(dy, dx)
     error = tolerance + 0.03 * r + r * turned
     lean = LEAN_RAD + turned  # a sensor off the centre moves sideways while the ring turns
-    norm = ALIKE * max(1.0, len(echoes) * half_angle / math.pi)
-    anything = 1.0 / (2.0 * (MOVES * moved + error))
+    norm = surfaces_heard(len(echoes), half_angle)
+    anything = anything_density(moved, error)
     filed, is_wall = 0.0, False
     for quarter in range(QUARTERS + 1):
         if quarter > 0 and is_wall and all_of.excluded_nat[quarter - 1] >= EXCLUDED_NAT:
             continue
         own, ring = axis + 0.5 * math.pi * quarter, yaw + 0.5 * math.pi * quarter
-        angle = abs(wrapped(own - path))
-        most = -moved * math.cos(max(0.0, angle - half_angle)) - error
-        least = -moved * math.cos(min(math.pi, angle + half_angle)) + error
-        density = (1.0 - FOLLOWS) * anything + (FOLLOWS / (least - most) if most <= change <= least else 0.0)
+        density = change_density(own - path, change, moved, error, half_angle)
         may_stay = density
         if quarter == 0 or all_of.excluded_nat[quarter - 1] < EXCLUDED_NAT:
             grazes = fits_unseen_wall(

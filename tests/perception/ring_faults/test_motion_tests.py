@@ -22,6 +22,7 @@ from perception.ring_faults.motion_tests import (
     check_motion,
 )
 from perception.ring_faults.replays import PAST_FIELDS, PAST_LOOKS, PastLooks
+from perception.ring_faults.servo_mounting import LOOK_DIRECTIONS, DirectionTrace, forget_directions
 
 COUNT = 24
 MOUNTS = np.array([[0.0, 0.0, math.tau * k / COUNT] for k in range(COUNT)])
@@ -32,8 +33,10 @@ STEP_M = 0.02
 class Ring:
     """A ring whose readings a test chooses."""
 
-    def __init__(self, mounts: Floats = MOUNTS) -> None:
+    def __init__(self, mounts: Floats = MOUNTS, *, on_servo: bool = False) -> None:
         self.mounts, count = mounts, len(mounts)
+        self.directions = zeros(DirectionTrace, LOOK_DIRECTIONS if on_servo else 0)
+        forget_directions(records(DirectionTrace, self.directions))
         self.echoes, self.memory = zeros(EchoTrace, count), zeros(RingTrace, 1)
         self.expected = zeros(Expected, count)
         self.past = np.zeros((count, PAST_LOOKS, PAST_FIELDS))
@@ -51,6 +54,7 @@ class Ring:
             records(RingTrace, self.memory),
             records(Expected, self.expected),
             PastLooks(self.past, self.looks, self.replayed_nat),
+            records(DirectionTrace, self.directions),
         )
         self.x += self.step_m
         return int(found)

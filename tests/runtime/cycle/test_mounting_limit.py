@@ -70,8 +70,12 @@ def test_a_reason_that_was_given_before_stays() -> None:
     assert limit_by_mounting(FAST, "why", Pose(1.0, 0.0, 0.0), heard(90.0, math.inf), SETTINGS) == (FAST, "why")
 
 
-def test_one_sensor_on_a_servo_limits_nothing() -> None:
+def test_a_sensor_on_a_servo_whose_arm_may_be_turned_limits_the_speed() -> None:
     settings = load_settings("room", robot="servo1")
-    monitor = RingMonitor(settings.ring)
-    monitor.observe(Firing(0.0, Pose(1.0, 0.0, 0.0), 0.0, np.full(len(settings.ring.mounts), 0.2)))
-    assert limit_by_mounting(FAST, None, Pose(1.0, 0.0, 0.0), monitor, settings) == (FAST, None)
+    monitor, ranges = RingMonitor(settings.ring), np.full(len(settings.ring.mounts), math.nan)
+    behind = int(np.argmax(np.abs([mount.angle_rad for mount in settings.ring.mounts])))
+    ranges[behind] = 0.3
+    monitor.observe(Firing(0.0, Pose(1.0, 0.0, 0.0), 0.0, ranges))
+    twist, why = limit_by_mounting(FAST, None, Pose(1.0, 0.0, 0.0), monitor, settings)
+    assert (twist.w, why) == (FAST.w, MOUNTED)
+    assert twist.v < FAST.v

@@ -1,0 +1,147 @@
+"""How a sensor on a servo is mounted: what the motion of a robot that winds excludes, and what it finds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from config.load import load_settings
+from config.world import AcousticsConfig, DrumConfig, WallConfig, WorldConfig
+from perception.kernel import Floats
+from perception.records import records, zeros
+from perception.ring_faults.memory import EVIDENCE_NAT, NO_ECHO_M, QUARTERS, RingTrace
+from perception.ring_faults.monitor import REASONS, RingMonitor
+from perception.ring_faults.motion_tests import TURNED
+from perception.ring_faults.mounting import EXCLUDED_NAT
+from perception.ring_faults.servo_mounting import (
+    LOOK_DIRECTIONS,
+    SILENCES_MAX,
+    DirectionTrace,
+    forget_directions,
+    weigh_direction,
+)
+from tests.perception.ring_faults.test_monitor import LieContext, Path, firings
+
+RING = load_settings("room", robot="servo1").ring
+NOISY = {"noise_relative": 0.01, "dropout": 0.05}
+STEP_M = 0.003
+"""Way from one firing to the next, m: .3 m/s at 10 ms."""
+MOUNTS = np.zeros((60, 3))
+
+
+def winding(way_m: float) -> Path:
+    """Return a way that turns by ±40°, so that no bearing looks twice in one direction."""
+    x = y = 0.0
+    path = list[tuple[float, float, float]]()
+    for k in range(round(way_m / STEP_M)):
+        yaw = 0.7 * math.sin(k / 60.0)
+        x, y = x + STEP_M * math.cos(yaw), y + STEP_M * math.sin(yaw)
+        path.append((x, y, yaw))
+    return path
+
+
+def world(reflection: str) -> WorldConfig:
+    walls = tuple(WallConfig(x1_m=-9.0, y1_m=y, x2_m=9.0, y2_m=y) for y in (-1.1, 1.3))
+    ends = tuple(WallConfig(x1_m=x, y1_m=-1.1, x2_m=x, y2_m=1.3) for x in (-1.2, 3.4))
+    acoustics = AcousticsConfig.model_validate({"model": reflection, **NOISY})
+    return WorldConfig(wall=walls + ends, drum=(DrumConfig(x_m=1.6, y_m=0.9, radius_m=0.2),), acoustics=acoustics)
+
+
+def turned(quarter: int) -> list[int]:
+    """Return which bearing answers in the place of each one of an arm that is put on turned by quarters."""
+    return np.roll(np.arange(60), -15 * quarter).tolist()
+
+
+def driven(reflection: str, quarter: int, seed: int, way_m: float) -> tuple[RingMonitor, float, str | None]:
+    """Return the monitor after a way, the way until it was found, or else all of it, and the reason."""
+    monitor, wired, way = RingMonitor(RING), turned(quarter), 0.0
+
+    def lie(ranges: Floats, _: LieContext) -> Floats:
+        (fired,) = np.flatnonzero(~np.isnan(ranges)).tolist()
+        swapped = np.full(60, math.nan)
+        swapped[wired.index(fired)] = ranges[fired]
+        return swapped
+
+    for way, firing in firings(RING, world(reflection), winding(way_m), lie, 0.0, seed):
+        monitor.observe(firing)
+        if (reason := monitor.take_problem()) is not None:
+            return monitor, way, reason
+    return monitor, way, None
+
+
+@pytest.mark.parametrize("reflection", ["specular", "cone"])
+def test_a_servo_as_the_file_says_is_soon_sure(reflection: str) -> None:
+    monitor, _, reason = driven(reflection, 0, 1, 0.9)
+    assert reason is None
+    assert (monitor._ring["excluded_nat"] >= EXCLUDED_NAT).all()
+    assert len(monitor.possible_obstacles()) == 0
+    assert float(monitor._ring["turned_nat"].max()) < 0.0
+
+
+def test_before_that_the_robot_expects_what_it_hears_on_all_sides() -> None:
+    monitor, _, _ = driven("cone", 0, 1, 0.05)
+    assert len(monitor.possible_obstacles()) > 0
+    monitor.reset()
+    assert len(monitor.possible_obstacles()) == 0
+    assert (monitor._directions["heard"]["range_m"] == NO_ECHO_M).all()
+
+
+@pytest.mark.parametrize("quarter", [1, 2, 3])
+@pytest.mark.parametrize("reflection", ["specular", "cone"])
+def test_an_arm_that_is_put_on_turned_is_doubted(reflection: str, quarter: int) -> None:
+    monitor, _, reason = driven(reflection, quarter, 2, 0.6)
+    assert reason is not None or monitor.is_doubted
+    assert monitor._ring["excluded_nat"][0, quarter - 1] < 0.0
+
+
+@pytest.mark.parametrize("quarter", [1, 2, 3])
+def test_an_arm_that_is_put_on_turned_is_named(quarter: int) -> None:
+    _, way, reason = driven("cone", quarter, 2, 2.5)
+    assert way < 2.2
+    assert reason == REASONS[TURNED + quarter - 1]
+    assert "arm" in reason
+
+
+def weighed(*looks: tuple[float, float, float]) -> tuple[Floats, Floats]:
+    """Return the evidence of looks ahead from places x of the path: range, x, axis; and the echoes kept."""
+    directions, ring = zeros(DirectionTrace, LOOK_DIRECTIONS), zeros(RingTrace, 1)
+    of = records(DirectionTrace, directions)
+    forget_directions(of)
+    all_of = records(RingTrace, ring)
+    for r, x, axis in looks:
+        all_of[0].path_m = x
+        weigh_direction((r, x, 0.0, axis), MOUNTS, (math.radians(15.0), 0.005, 1.7), of, all_of[0])
+    return ring["turned_nat"][0], directions["heard"]["range_m"]
+
+
+def test_what_comes_nearer_ahead_speaks_for_the_file() -> None:
+    assert (weighed((1.0, 0.0, 0.01), (0.9, 0.1, 0.02))[0] < 0.0).all()
+    nats = weighed((1.0, 0.0, 0.01), (1.1, 0.1, 0.02))[0]
+    assert int(nats.argmax()) == 1
+    assert nats[1] > 0.0
+
+
+@pytest.mark.parametrize(
+    "second",
+    [
+        pytest.param((1.0, 0.1, 0.01), id="equal to the bit, as of a frozen sensor"),
+        pytest.param((0.99, 0.01, 0.01), id="the robot has hardly moved"),
+        pytest.param((0.4, 0.6, 0.01), id="the echo is too old"),
+        pytest.param((0.9, 0.1, 0.2), id="another direction"),
+    ],
+)
+def test_nothing_is_concluded_where_nothing_is_compared(second: tuple[float, float, float]) -> None:
+    assert weighed((1.0, 0.0, 0.01), second)[0].tolist() == [0.0] * QUARTERS
+
+
+def test_an_echo_is_dropped_after_two_silences_in_its_direction() -> None:
+    silence = (NO_ECHO_M, 0.02, 0.01)
+    assert weighed((1.0, 0.0, 0.01), silence)[1].max() == pytest.approx(1.0)
+    assert weighed((1.0, 0.0, 0.01), *[silence] * SILENCES_MAX)[1].max() == NO_ECHO_M
+
+
+def test_evidence_is_limited_to_both_sides() -> None:
+    nats, _ = weighed(*((1.7 - x, x, 0.01) for x in np.arange(0.0, 1.6, 0.04).tolist()))
+    assert (nats >= -EVIDENCE_NAT).all()
