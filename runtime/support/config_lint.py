@@ -9,7 +9,7 @@ from config.settings import Settings
 from drivers.capabilities import missing
 from drivers.registry import capabilities
 from runtime.support.blind_sides import blind_notes
-from runtime.support.pattern_check import crosstalk_note, gap_note, pattern_speed_m_s
+from runtime.support.pattern_check import crosstalk_note, gap_note, more_looks, pattern_speed_m_s
 
 
 def lint_settings(settings: Settings) -> list[str]:
@@ -52,13 +52,13 @@ def lint_settings(settings: Settings) -> list[str]:
     elif speed_m_s < min(arbiter.base_velocity_m_s, settings.body.speed_max_m_s):
         warnings.append(
             f"ring.firing: the pattern looks ahead so seldom that it limits the speed to {speed_m_s:.2f} m/s, below "
-            f"behaviors.arbiter.base_velocity_m_s = {arbiter.base_velocity_m_s:g}; fire more sensors at a time"
+            f"behaviors.arbiter.base_velocity_m_s = {arbiter.base_velocity_m_s:g}; {more_looks(settings.ring)}"
         )
     elif pattern_speed_m_s(settings, missed=1) == 0.0:
         warnings.append(
             "ring.firing: one reading that fails leaves the way unseen for longer than "
             f"behaviors.avoid_static_obstacle.echo_age_max_s = {avoid.echo_age_max_s:g}: the robot stops until that "
-            "sensor answers again; fire more sensors at a time, or let beams overlap"
+            f"sensor answers again; {more_looks(settings.ring)}, or let beams overlap"
         )
     fires = settings.link.port != "ros2"  # there the sensors' own nodes do, or a simulator, which has no crosstalk
     if fires and (crosstalk := crosstalk_note(settings.ring)) is not None:

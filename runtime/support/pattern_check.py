@@ -80,9 +80,14 @@ def refuse_undrivable(settings: Settings) -> None:
         enough_s = math.ceil(10.0 * (oldest_s + arbiter.base_velocity_m_s / body.acceleration_max_m_s2)) / 10.0
         raise FiringError(
             f"ring.firing: a look {where} can be {oldest_s:.2f} s old, and counts for {age_path} "
-            f"{view.age_max_s:g} s, so that the robot could not drive; fire more sensors at a time or make "
+            f"{view.age_max_s:g} s, so that the robot could not drive; {more_looks(settings.ring)} or make "
             f"step_period_s shorter, or make {age_path} at least {enough_s:g}"
         )
+
+
+def more_looks(ring: RingConfig) -> str:
+    """Return by which change of its firing pattern a ring looks in each direction more often."""
+    return "give the servo fewer bearings" if ring.has_servo else "fire more sensors at a time"
 
 
 def pattern_speed_m_s(settings: Settings, missed: int = 0) -> float:
