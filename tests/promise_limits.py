@@ -45,7 +45,8 @@ LIMITS: Sequence[str] = (
     " be ahead, until the motion has excluded that: among close furniture and in corridors six robots touched "
     "something above 0.05 m/s in 6 of 168 drives of 20 s, at up to 0.26 m/s, five of them with eight sensors, which "
     "hear little. A robot that seems turned creeps for up to 20 s before it is named, one with a sensor on a servo "
-    "for longer (18 drives of one mounted backwards: said after 1.6 s in the median, 12 s at most, nothing touched). "
+    "for longer (18 drives of one mounted backwards: slow with a reason after 12 s at most, in 7 this one first; "
+    "nothing touched). "
     "A ring that only looks ahead hears nothing of what is then ahead of a half turn. A `p3dx` with a disc at the "
     "front and one at the back exchanged touched something in 3 of 27.",
     "Any lie while the robot stands, or among surfaces whose ranges its motion does not change: nothing differs "
