@@ -198,7 +198,7 @@ def poison_all(moment: Moment, is_replayed: Callable[[str], bool]) -> Counter[st
     numbers, fresh = dict(numbers_of(snapshot)), dict(numbers_of(moment.perception().snapshot()))
     bounds = moment.bounds()
     for name, values in numbers.items():
-        if is_scratch(name):
+        if is_scratch(name) or values.size == 0:  # of a ring without a servo
             continue
         before, raw = values.copy(), values.view(np.uint8) if values.dtype.kind == "b" else values
         places: tuple[Any, ...] = (..., (-1,) * values.ndim)
