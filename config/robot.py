@@ -245,6 +245,12 @@ class RingConfig(Strict):
         return any(sensor.servo for sensor in self.sensors or ())
 
     @property
+    def lone_servo(self) -> SensorConfig | None:
+        """The ring's only sensor, if it stands on a servo that sweeps half a turn or more."""
+        first, *others = self.sensors or (None,)
+        return first if first is not None and first.servo and not others and first.sweep_deg >= 180.0 else None
+
+    @property
     def window_m(self) -> float:
         """Range up to which a firing listens, m."""
         return self.range_max_m if self.firing.window_m is None else self.firing.window_m

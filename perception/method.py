@@ -57,8 +57,10 @@ class Method(Protocol):
         """Return what has a label and was left behind; the same tuple until it changes."""
         ...
 
-    def locate_echoes(self, bearings: Floats) -> bool:
-        """Write where in its beam each echo of the last firing came from; return whether walls are known as mirrors.
+    def locate_echoes(self, bearings: Floats) -> int:
+        """Write where in its beam each echo of the last firing came from; return what is known of slanting walls.
+
+        That is −1 if they do not answer, as mirrors, 1 if they do, and 0 if it is not known.
 
         Parameters
         ----------

@@ -64,9 +64,9 @@ class NoMethod:
         """Return None: there are no objects."""
         return None
 
-    def locate_echoes(self, _bearings: Floats) -> bool:
-        """Write nothing and return False: there are no objects."""
-        return False
+    def locate_echoes(self, _bearings: Floats) -> int:
+        """Write nothing and return 0: there are no objects."""
+        return 0
 
     def shift_object(self, number: int, dx: float, dy: float) -> None:
         """Move nothing: there are no objects."""

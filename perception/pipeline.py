@@ -155,7 +155,7 @@ class Perception:
         made = self.method.observe(placed)
         self.surfaces.observe(placed)
         if self.grid is not None:
-            self.grid.observe(trusted, are_mirrors=self.method.locate_echoes(self.grid.bearings))
+            self.grid.observe(trusted, slanting=self.method.locate_echoes(self.grid.bearings))
         self.canyon_map.observe(trusted.pose)
         return made
 

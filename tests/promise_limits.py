@@ -44,11 +44,11 @@ LIMITS: Sequence[str] = (
     "the start (by a half, as a Pioneer is whose two arrays are exchanged), the robot is slow where something would"
     " be ahead, until the motion has excluded that: among close furniture and in corridors six robots touched "
     "something above 0.05 m/s in 6 of 168 drives of 20 s, at up to 0.26 m/s, five of them with eight sensors, which "
-    "hear little. A robot that seems turned creeps for up to 20 s before it is named, one with a sensor on a servo "
-    "for longer (18 drives of one mounted backwards: slow with a reason after 12 s at most, in 7 this one first; "
-    "nothing touched). "
-    "A ring that only looks ahead hears nothing of what is then ahead of a half turn. A `p3dx` with a disc at the "
-    "front and one at the back exchanged touched something in 3 of 27.",
+    "hear little. A robot that seems turned creeps for up to 20 s before it is named, one whose only sensor is on a "
+    "servo for longer (18 drives of one mounted backwards: slow with a reason after 13.9 s at most, nothing touched; "
+    "of a servo among other sensors, or one that sweeps less than half a turn, it is not seen). A ring that only "
+    "looks ahead hears nothing of what is then ahead of a half turn. A `p3dx` with a disc at the front and one at "
+    "the back exchanged touched something in 3 of 27.",
     "Any lie while the robot stands, or among surfaces whose ranges its motion does not change: nothing differs "
     "then; after half a metre or half a turn of repeated echoes, or twice the longest such silence so far, the robot "
     "creeps, and after 4 m of silence. Where nothing echoes, silence is true and false alike.",

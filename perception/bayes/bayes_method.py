@@ -269,7 +269,7 @@ class BayesPerception:
             self._archived_labels = (*models, *other_circles(others, self.memory, self.settings, least, ()))
         return self._archived_labels
 
-    def locate_echoes(self, bearings: Floats) -> bool:
+    def locate_echoes(self, bearings: Floats) -> int:
         """Write where in its beam each echo of the last firing came from; see `Method.locate_echoes`."""
         sure = self._config.report_probability
         return locate_echoes(self.memory.s, self.memory.tracks, self.settings, self._readings, sure, bearings)

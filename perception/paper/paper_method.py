@@ -127,10 +127,10 @@ class PaperPerception:
         """The numbers of segments and clusters."""
         return MapCounts(self.outline.size, self.outline.total, self.clusters.count)
 
-    def locate_echoes(self, bearings: Floats) -> bool:
-        """Write NaN for each sensor, return False: this method does not associate echoes with objects."""
+    def locate_echoes(self, bearings: Floats) -> int:
+        """Write NaN for each sensor, return 0: this method does not associate echoes with objects."""
         bearings[:] = np.nan
-        return False
+        return 0
 
     def segment_geometry(self) -> Floats:
         """Return a copy of the outline segments: end points x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""

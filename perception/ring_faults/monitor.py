@@ -10,9 +10,9 @@ can only be compared with how it moves. An honest ring among objects that stand 
 - *Missing.* Readings do not depend on what is there: known echoes are silent all at once, or elsewhere, as random
   ranges are. How often an honest ring misses a known echo is learned on the way.
 - *Turned.* The ranges change as they would on a ring that is mounted turned by 90°, 180° or 270°
-  (`perception.ring_faults.mounting`, of a sensor on a servo `perception.ring_faults.servo_mounting`). `EXCLUDED_NAT`
-  of evidence exclude such a mounting until the odometry is reset; before, it limits the speed beside what would be
-  ahead, and `DOUBTED_NAT` of evidence for it everywhere. A corridor does not tell a half turn.
+  (`perception.ring_faults.mounting`, of a single sensor on a servo `perception.ring_faults.servo_mounting`).
+  `EXCLUDED_NAT` of evidence exclude such a mounting until the odometry is reset; before, it limits the speed beside
+  what would be ahead, and `DOUBTED_NAT` of evidence for it everywhere. A corridor does not tell a half turn.
 - *Changed.* All readings change at once from one round of the firing pattern to the next, by a change that the
   sensors have in common (`perception.ring_faults.changes`).
 - *Exchanged.* What a sensor hears is what others heard where another one looks, or behind it; or it hears nothing of
@@ -59,7 +59,7 @@ from perception.sensor_mounts import mounts_array, ring_pose, turn_mounts
 
 _TURNED: Final = (
     "the ranges change as if the ring were mounted turned by {} against the robot file: check how it is mounted, "
-    "its cables and the order of its sensors, or how the arm sits on its servo, then re-arm"
+    "its cables and the order of its sensors (on a servo: how the arm sits), then re-arm"
 )
 _CHANGED: Final = (
     "the readings of the whole ring changed at once, as no motion changes them: {}; check the ring's power, cables "
@@ -148,6 +148,8 @@ class RingMonitor:
         _half_angle=CONSTANT,
         _tolerance=CONSTANT,
         _reach_m=CONSTANT,
+        _may_be_turned=CONSTANT,
+        _pivot=CONSTANT,
         _past=PLACE,
         _looks=COUNT,
         _replayed_nat=POSITIVE,
@@ -172,7 +174,10 @@ class RingMonitor:
         self._echo_records = records(EchoTrace, self._echoes)
         self._ring = zeros(RingTrace, 1)
         self._ring_records = records(RingTrace, self._ring)
-        self._directions = zeros(DirectionTrace, LOOK_DIRECTIONS if ring.has_servo else 0)
+        servo = ring.lone_servo
+        self._may_be_turned = servo is not None or not ring.has_servo
+        self._pivot = np.zeros(2) if servo is None else np.array([servo.x_m, servo.y_m])
+        self._directions = zeros(DirectionTrace, 0 if servo is None else LOOK_DIRECTIONS)
         self._direction_records = records(DirectionTrace, self._directions)
         forget_directions(self._direction_records)
         self._expected = records(Expected, zeros(Expected, len(ring.mounts)))
@@ -243,8 +248,13 @@ class RingMonitor:
         return None if found == NOTHING else REASONS[found]
 
     def possible_obstacles(self) -> Floats:
-        """Return where the last echoes came from if the ring is turned, as far as that is not excluded: (k, 2), m."""
-        found = possible_places(self._mounts, self._echo_records, self._ring_records, self._places)
+        """Return where the last echoes came from if the ring is turned, as far as that is not excluded: (k, 2), m.
+
+        Of a servo among other sensors, or one that sweeps less than half a turn, the motion says too little: none.
+        """
+        if not self._may_be_turned:
+            return self._places[:0]
+        found = possible_places(self._mounts, self._pivot, self._echo_records, self._ring_records, self._places)
         return self._places[:found]
 
     @property

@@ -300,7 +300,7 @@ def check_motion(
         replayed = max(replayed, nats)
         weigh_look(i, look, is_ahead, reception, echoes, all_of)
         if len(directions) > 0:
-            weigh_direction(look, mounts, reception, directions, all_of)
+            weigh_direction(i, look, yaw, mounts, reception, echoes, directions, all_of)
         elif r >= 0.0:
             weigh_change(i, look, yaw, mounts, reception, echoes, all_of)
     found = REPEATED if replayed >= REPLAY_NAT else conclusion(all_of)

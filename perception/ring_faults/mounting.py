@@ -167,7 +167,9 @@ def weigh_change(
 
 
 @kernel
-def possible_places(mounts: Floats, echoes: Records[EchoTrace], ring: Records[RingTrace], places: Floats) -> int:
+def possible_places(
+    mounts: Floats, pivot: Floats, echoes: Records[EchoTrace], ring: Records[RingTrace], places: Floats
+) -> int:
     """Enter the places of the last echoes as each turned mounting has them that is not excluded; return how many.
 
     A silence does not remove an echo: a ring that is turned comes nearer to what it seems to leave behind.
@@ -176,6 +178,8 @@ def possible_places(mounts: Floats, echoes: Records[EchoTrace], ring: Records[Ri
     ----------
     mounts, echoes
         As for `motion_tests.check_motion`.
+    pivot : (2,) float
+        About which what is turned would be: the ring's centre or the servo's axis, x, y in the ring's frame, m.
     ring : (1,) record
         What is remembered of the ring.
     places : (n · QUARTERS, 2) float
@@ -191,9 +195,10 @@ def possible_places(mounts: Floats, echoes: Records[EchoTrace], ring: Records[Ri
             if heard.range_m < 0.0 or not echoes[i].is_known or all_of.path_m - heard.path_m > ECHO_KEPT_M:
                 continue
             yaw = heard.axis - mounts[i, 2]
-            dx = math.cos(yaw) * mounts[i, 0] - math.sin(yaw) * mounts[i, 1]
-            dy = math.sin(yaw) * mounts[i, 0] + math.cos(yaw) * mounts[i, 1]
-            x, y = heard.x - dx, heard.y - dy  # the ring's centre
+            off_x, off_y = mounts[i, 0] - pivot[0], mounts[i, 1] - pivot[1]
+            dx = math.cos(yaw) * off_x - math.sin(yaw) * off_y
+            dy = math.sin(yaw) * off_x + math.cos(yaw) * off_y
+            x, y = heard.x - dx, heard.y - dy  # the pivot
             dx += heard.range_m * math.cos(heard.axis)
             dy += heard.range_m * math.sin(heard.axis)
             places[count, 0], places[count, 1] = x + c * dx - s * dy, y + s * dx + c * dy

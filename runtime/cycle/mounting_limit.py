@@ -23,8 +23,8 @@ MOUNTED: Final = (
 )
 DOUBTED: Final = (
     "the ranges change as if the ring were mounted turned: the robot drives slowly until more of them decide it; if "
-    "this lasts, check how the ring is mounted, its cables and the order of its sensors, or how the arm sits on its "
-    "servo"
+    "this lasts, check how the ring is mounted, its cables and the order of its sensors (on a servo: "
+    "how the arm sits)"
 )
 
 

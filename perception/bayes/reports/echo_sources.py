@@ -15,6 +15,7 @@ from perception.bayes.walls.contact import (
     contact,
     corner_of,
     edge_direction,
+    edges_answer,
     explaining_wall,
     is_on_straight_span,
     wall_normal,
@@ -64,10 +65,10 @@ def is_sure_corner(corner: RoomCorner) -> bool:
 
 
 @kernel
-def locate_echoes(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int, sure: float, out: Floats) -> bool:
+def locate_echoes(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int, sure: float, out: Floats) -> int:
     """Write the bearing of each fired reading's contact, NaN where nothing that is sure explains it.
 
-    Return whether the walls are known to be mirrors.
+    Return −1 if slanting walls are known not to answer, 1 if they do, 0 if it is not known.
 
     Parameters
     ----------
@@ -103,4 +104,4 @@ def locate_echoes(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
                     if c >= 0 and is_sure_corner(room.corners[c]):
                         bearing = bearing_of(q, room.corners[c].x - q.x, room.corners[c].y - q.y, p)
         out[s[0].scratch.fired_sensors[i]] = bearing
-    return are_mirrors(room)
+    return 1 if edges_answer(room) else -1 if are_mirrors(room) else 0

@@ -95,6 +95,7 @@ def restore_walls(memory: Memory, text: str, bounds: Mapping[str, Bound]) -> str
     numbers = int(memory.state["objects_numbered"][0])
     if max(room["walls"]["spans"]["number"].max(), room["walls"]["bins"]["number"].max()) > numbers:
         return WALLS_LOST
+    room["jitter"] = np.zeros((), room["jitter"].dtype)  # odometry has gone on since
     memory.state["room"] = room
     return None
 

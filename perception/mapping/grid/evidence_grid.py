@@ -129,8 +129,12 @@ class EvidenceGrid:
         self.bearings: Floats = np.full(len(ring.mounts), math.nan)
         """Where in its beam each echo of the next firing came from, rad from the axis; NaN where unknown."""
 
-    def observe(self, firing: Firing, *, are_mirrors: bool = False) -> None:
-        """Enter a firing, which is given in the odometry's frame, and whether walls are known to be mirrors."""
+    def observe(self, firing: Firing, *, slanting: int = 0) -> None:
+        """Enter a firing, which is given in the odometry's frame, and what is known of slanting walls.
+
+        As of `perception.method.Method.locate_echoes`. What was known stays until the walls say otherwise: the cells
+        stay, too, when the walls are forgotten.
+        """
         pose, ranges = firing.pose, firing.ranges_m
         moved = math.hypot(pose.x - self._at[0], pose.y - self._at[1])
         if math.isfinite(moved):
@@ -141,7 +145,8 @@ class EvidenceGrid:
         self.method.observe(firing, self.bearings, self.place, self.silence_m)
         self.sight_lines.observe(firing, self.bearings, self.place, self.method.holding())
         self._firings += 1
-        self._are_mirrors = int(are_mirrors)
+        if slanting != 0:
+            self._are_mirrors = int(slanting < 0)
 
     @property
     def place(self) -> int:

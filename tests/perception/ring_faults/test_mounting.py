@@ -27,10 +27,8 @@ def excluded(ring: Ring) -> list[int]:
 
 
 def places(ring: Ring) -> Floats:
-    found = np.zeros((len(ring.mounts) * QUARTERS, 2))
-    return found[
-        : possible_places(ring.mounts, records(EchoTrace, ring.echoes), records(RingTrace, ring.memory), found)
-    ]
+    found, echoes = np.zeros((len(ring.mounts) * QUARTERS, 2)), records(EchoTrace, ring.echoes)
+    return found[: possible_places(ring.mounts, np.zeros(2), echoes, records(RingTrace, ring.memory), found)]
 
 
 def between_walls(y: float, quarter: int = 0) -> Floats:

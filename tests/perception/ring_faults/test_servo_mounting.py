@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from config.load import load_settings
+from config.robot import SensorConfig
 from config.world import AcousticsConfig, DrumConfig, WallConfig, WorldConfig
+from drivers.messages import Firing, Pose
 from perception.kernel import Floats
 from perception.records import records, zeros
-from perception.ring_faults.memory import EVIDENCE_NAT, NO_ECHO_M, QUARTERS, RingTrace
+from perception.ring_faults.memory import EVIDENCE_NAT, NO_ECHO_M, QUARTERS, EchoTrace, RingTrace
 from perception.ring_faults.monitor import REASONS, RingMonitor
 from perception.ring_faults.motion_tests import TURNED
 from perception.ring_faults.mounting import EXCLUDED_NAT
@@ -22,13 +24,14 @@ from perception.ring_faults.servo_mounting import (
     forget_directions,
     weigh_direction,
 )
+from perception.sensor_mounts import mounts_array
 from tests.perception.ring_faults.test_monitor import LieContext, Path, firings
 
 RING = load_settings("room", robot="servo1").ring
 NOISY = {"noise_relative": 0.01, "dropout": 0.05}
 STEP_M = 0.003
 """Way from one firing to the next, m: .3 m/s at 10 ms."""
-MOUNTS = np.zeros((60, 3))
+MOUNTS = mounts_array(RING.mounts)
 
 
 def winding(way_m: float) -> Path:
@@ -104,15 +107,58 @@ def test_an_arm_that_is_put_on_turned_is_named(quarter: int) -> None:
     assert "arm" in reason
 
 
+SERVO = SensorConfig(x_m=0.0, y_m=0.0, angle_deg=0.0, servo=True, bearings=13, sweep_deg=180.0)
+GUIDE = RING.model_copy(update={"sensors": (SERVO,)})
+"""The servo of the page on building a ring."""
+
+
+@pytest.mark.parametrize("half_m", [0.8, 1.0])
+@pytest.mark.parametrize("lean_deg", [0.0, 2.0])
+@pytest.mark.parametrize("name", ["servo1", "guide"])
+def test_the_walls_of_a_corridor_are_no_turned_arm(name: str, lean_deg: float, half_m: float) -> None:
+    ring = RING if name == "servo1" else GUIDE
+    walls = tuple(WallConfig(x1_m=-9.0, y1_m=y, x2_m=9.0, y2_m=y) for y in (-half_m, half_m))
+    acoustics = AcousticsConfig.model_validate({"model": "cone", **NOISY})
+    monitor, lean = RingMonitor(ring), math.radians(lean_deg)
+    step = STEP_M if name == "servo1" else 6.0 * STEP_M
+    path = [(k * step * math.cos(lean), k * step * math.sin(lean), lean) for k in range(round(4.0 / step))]
+    for _, firing in firings(ring, WorldConfig(wall=walls, acoustics=acoustics), path, None, 0.0, 3):
+        monitor.observe(firing)
+        assert monitor.take_problem() is None
+        assert not monitor.is_doubted
+
+
+def test_other_rings_with_servos_exclude_nothing() -> None:
+    (servo,) = RING.sensors or ()
+    fixed = SensorConfig(x_m=0.1, y_m=0.0, angle_deg=0.0)
+    for sensors in ((servo.model_copy(update={"sweep_deg": 90.0, "bearings": 16}),), (servo, fixed)):
+        monitor = RingMonitor(RING.model_copy(update={"sensors": sensors}))
+        assert len(monitor._directions) == 0
+        assert len(monitor.possible_obstacles()) == 0
+
+
+def test_an_arm_is_turned_about_the_axis_of_its_servo() -> None:
+    (servo,) = RING.sensors or ()
+    ring = RING.model_copy(update={"sensors": (servo.model_copy(update={"x_m": 0.15, "arm_m": 0.02}),)})
+    monitor = RingMonitor(ring)
+    ranges = np.full(len(ring.mounts), math.nan)
+    ahead = int(np.abs([mount.angle_rad for mount in ring.mounts]).argmin())
+    ranges[ahead] = 0.5
+    monitor.observe(Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, ranges))
+    found = monitor.possible_obstacles()
+    assert found[:, 0].min() == pytest.approx(0.15 - 0.52, abs=0.01)
+    assert np.hypot(found[:, 0] - 0.15, found[:, 1]) == pytest.approx([0.52] * QUARTERS, abs=0.01)
+
+
 def weighed(*looks: tuple[float, float, float]) -> tuple[Floats, Floats]:
     """Return the evidence of looks ahead from places x of the path: range, x, axis; and the echoes kept."""
     directions, ring = zeros(DirectionTrace, LOOK_DIRECTIONS), zeros(RingTrace, 1)
-    of = records(DirectionTrace, directions)
+    of, echoes = records(DirectionTrace, directions), records(EchoTrace, zeros(EchoTrace, len(MOUNTS)))
     forget_directions(of)
     all_of = records(RingTrace, ring)
     for r, x, axis in looks:
         all_of[0].path_m = x
-        weigh_direction((r, x, 0.0, axis), MOUNTS, (math.radians(15.0), 0.005, 1.7), of, all_of[0])
+        weigh_direction(0, (r, x, 0.0, axis), 0.0, MOUNTS, (math.radians(15.0), 0.005, 1.7), echoes, of, all_of[0])
     return ring["turned_nat"][0], directions["heard"]["range_m"]
 
 

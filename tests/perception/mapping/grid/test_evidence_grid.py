@@ -73,11 +73,15 @@ def test_among_walls_known_as_mirrors_no_beam_is_open_because_it_was_passed_ofte
     free = {}
     for are_mirrors in (False, True):
         for k in range(2 * PLACES_MIN):
-            grid.observe(Firing(0.0, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges), are_mirrors=are_mirrors)
+            grid.observe(Firing(0.0, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges), slanting=-int(are_mirrors))
         free[are_mirrors] = int((grid.occupancy().occupied < 0.4).sum())
     assert grid.method.mirrors < 0.5, "the cells do not know"
     assert free[False] > 50
     assert free[True] == 0
+    grid.observe(Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, ranges))
+    assert grid.mirrors == 1.0, "what was known stays when the walls are forgotten"
+    grid.observe(Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, ranges), slanting=1)
+    assert grid.mirrors < 0.5
 
 
 @pytest.mark.covered
