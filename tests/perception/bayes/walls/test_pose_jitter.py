@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Final
 
 import numpy as np
 import pytest
 
+from config.load import load_settings
+from config.world import AcousticsConfig, WallConfig, WorldConfig
+from drivers.emulator.scene import compile_scene
+from drivers.emulator.sonar import Sonar
+from drivers.messages import Firing, Pose
+from perception.bayes.bayes_method import BayesPerception
 from perception.bayes.memory.scratch import Pull, ShiftInformation
 from perception.bayes.memory.state import Memory
 from perception.bayes.memory.wall_records import JITTERS, PoseJitter, WallMap
 from perception.bayes.walls.pose_jitter import JITTERS_M, mean_shift, place_by_others, sum_pulls, weigh_jitters
+from perception.pipeline import Perception
 from perception.records import records, zeros
+from perception.sensor_mounts import mounts_array, sensor_pose
 from tests.naive_walls import Array
 from tests.perception.bayes.random_tracks import P, examples
 from tests.perception.bayes.rooms import SIGMA, fill, new_room, place_wall
@@ -123,3 +132,33 @@ def test_mean_and_evidence_equal_those_of_gaussian_densities(examples: int) -> N
 def log_density(errors: Array, covariance: Array) -> float:
     """Return the log density of errors of mean 0, but for a constant."""
     return float(-0.5 * (errors @ np.linalg.solve(covariance, errors) + np.linalg.slogdet(covariance)[1]))
+
+
+@pytest.mark.compiled
+def test_poses_that_jump_are_found_in_a_drive_and_exact_ones_are_not() -> None:
+    settings = load_settings("hallway")
+    ring, mounts = settings.ring, mounts_array(settings.ring.mounts)
+    corners = ((-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0))
+    walls = tuple(
+        WallConfig(x1_m=a[0], y1_m=a[1], x2_m=b[0], y2_m=b[1]) for a, b in itertools.pairwise((*corners, corners[0]))
+    )
+    acoustics = AcousticsConfig(model="cone", noise_relative=0.005)
+    for jitter_m in (0.0, 0.03):
+        rng = np.random.default_rng(45)
+        sonar = Sonar(ring, compile_scene(WorldConfig(wall=walls, acoustics=acoustics)), acoustics, rng)
+        perception = Perception(ring, settings.models, settings.perception)
+        assert isinstance(perception.method, BayesPerception)
+        scratch, off = perception.method.memory.s[0].scratch, []
+        for k in range(600):
+            yaw = 0.02 * k
+            true = Pose(math.cos(yaw), math.sin(yaw), yaw + 0.5 * math.pi)
+            dx, dy = rng.normal(0.0, jitter_m, 2).tolist()
+            ranges = sonar.fire(true, true.theta, range(k % 3, 24, 3))
+            perception.observe(Firing(0.1 * k, Pose(true.x + dx, true.y + dy, true.theta), true.theta, ranges))
+            while perception.can_refine:
+                perception.refine()
+            for i in range(8 if k >= 300 else 0):
+                x, y, _ = sensor_pose(mounts, scratch.fired_sensors[i], (true.x, true.y, true.theta))
+                off.append((scratch.fired[i].x - x, scratch.fired[i].y - y))
+        assert JITTERS_M[perception.method.memory.state["room"]["jitter"]["level"][0]] == jitter_m
+        assert np.std(off) <= 0.5 * jitter_m
