@@ -196,8 +196,7 @@ def run_trial(
     state = fresh_state(settings, recognises=recognises)
     budget, cycle = QuantumBudget(QUANTA_PER_CYCLE), 0
     until_s = begin_s + (HONEST_S if kind is None else LIE_S)
-    is_turned = kind is not None and kind.startswith("turned")
-    is_turned = is_turned or (kind == "one backwards" and settings.ring.has_servo)
+    is_turned = (kind or "").startswith("turned") or (kind == "one backwards" and settings.ring.has_servo)
     names = frozenset[str]() if kind is None else HELD | {DOUBTED} if is_turned else HELD
     run_s = before_m_s = speed_m_s = contact_m_s = way_m = 0.0
     place = device.truth.pose

@@ -94,6 +94,38 @@ def change_density(angle: float, change: float, moved: float, error: float, half
 
 
 @kernel
+def may_graze_wall(
+    i: int,
+    r: float,
+    axes: tuple[float, float],
+    moved: tuple[float, float, float],
+    slack: tuple[float, float],
+    mounts: Floats,
+    reception: Reception,
+    echoes: Records[EchoTrace],
+    path_m: float,
+) -> bool:
+    """Return whether a wall along the path may explain a change of range, one that is seen or one that is not.
+
+    Parameters
+    ----------
+    i, r, mounts, reception, echoes, path_m
+        As for `repeats.is_parallel_wall`.
+    axes : (float, float)
+        Directions of the sensor and of the ring, rad.
+    moved : (float, float, float)
+        By how much the sensor has moved, x and y, and the range has changed, m.
+    slack : (float, float)
+        As for `sensor_faults.wall.fits_unseen_wall`.
+    """
+    (axis, yaw), (dx, dy, change) = axes, moved
+    path = math.atan2(dy, dx)
+    return fits_unseen_wall(
+        wrapped(axis - path), change, math.hypot(dx, dy), wrapped(yaw - path), mounts, reception[0], slack
+    ) or is_parallel_wall(i, r, (dx, dy), yaw, mounts, reception, slack[1], echoes, path_m)
+
+
+@kernel
 def weigh_change(
     i: int,
     look: Look,
@@ -147,10 +179,8 @@ def weigh_change(
         density = change_density(own - path, change, moved, error, half_angle)
         may_stay = density
         if quarter == 0 or all_of.excluded_nat[quarter - 1] < EXCLUDED_NAT:
-            grazes = fits_unseen_wall(
-                wrapped(own - path), change, moved, wrapped(ring - path), mounts, half_angle, (error, lean)
-            ) or is_parallel_wall(i, r, (dx, dy), ring, mounts, reception, lean, echoes, all_of.path_m)
-            if grazes:
+            motion = (dx, dy, change)
+            if may_graze_wall(i, r, (own, ring), motion, (error, lean), mounts, reception, echoes, all_of.path_m):
                 may_stay = max(density, anything)
                 is_wall = is_wall or quarter == 0
         if quarter == 0:

@@ -30,9 +30,14 @@ from perception.ring_faults.memory import (
     SensorPlace,
     mark,
 )
-from perception.ring_faults.mounting import ECHO_KEPT_M, EXCLUDED_NAT, LEAN_RAD, change_density, surfaces_heard
-from perception.ring_faults.repeats import is_parallel_wall
-from perception.sensor_faults.wall import fits_unseen_wall
+from perception.ring_faults.mounting import (
+    ECHO_KEPT_M,
+    EXCLUDED_NAT,
+    LEAN_RAD,
+    change_density,
+    may_graze_wall,
+    surfaces_heard,
+)
 
 LOOK_DIRECTIONS: Final = 60
 """Directions of the room that are distinguished: a fifth of a beam of 30° each, as far apart as a servo's steps."""
@@ -101,19 +106,17 @@ def weigh_direction(
     if before >= 0.0 and all_of.path_m - c.heard.path_m <= ECHO_KEPT_M:
         if moved < MOVED_MIN_M:
             return
-        if r != before:  # a frozen sensor says nothing of its place
-            error = tolerance + 0.03 * r + 0.5 * r * abs(wrapped(axis - c.heard.axis))
-            path, change = math.atan2(dy, dx), r - before
-            own, lean = axis - path, LEAN_RAD + abs(wrapped(axis - c.heard.axis))
-            if fits_unseen_wall(
-                wrapped(own), change, moved, wrapped(yaw - path), mounts, half_angle, (error, lean)
-            ) or is_parallel_wall(i, r, (dx, dy), yaw, mounts, reception, lean, echoes, all_of.path_m):
-                mark(c.heard, r, x, y, axis, all_of.path_m)
-                return
+        turn, change, path_m = abs(wrapped(axis - c.heard.axis)), r - before, all_of.path_m
+        error, lean = tolerance + 0.03 * r + 0.5 * r * turn, LEAN_RAD + turn
+        is_frozen = r == before  # which says nothing of the sensor's place
+        if not is_frozen and not may_graze_wall(
+            i, r, (axis, yaw), (dx, dy, change), (error, lean), mounts, reception, echoes, path_m
+        ):
+            own, norm = axis - math.atan2(dy, dx), surfaces_heard(len(mounts), half_angle)
             filed = change_density(own, change, moved, error, half_angle)
             for k in range(QUARTERS):
                 turned = change_density(own + 0.5 * math.pi * (k + 1), change, moved, error, half_angle)
-                nats = math.log(turned / filed) / surfaces_heard(len(mounts), half_angle)
+                nats = math.log(turned / filed) / norm
                 all_of.turned_nat[k] = max(-EVIDENCE_NAT, all_of.turned_nat[k] + nats)
                 if all_of.excluded_nat[k] < EXCLUDED_NAT:
                     all_of.excluded_nat[k] = max(-EXCLUDED_NAT, all_of.excluded_nat[k] - nats)

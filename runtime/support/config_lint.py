@@ -55,10 +55,11 @@ def lint_settings(settings: Settings) -> list[str]:
             f"behaviors.arbiter.base_velocity_m_s = {arbiter.base_velocity_m_s:g}; {more_looks(settings.ring)}"
         )
     elif pattern_speed_m_s(settings, missed=1) == 0.0:
+        overlap = "" if settings.ring.has_servo else ", or let beams overlap"  # with more bearings, they do
         warnings.append(
             "ring.firing: one reading that fails leaves the way unseen for longer than "
             f"behaviors.avoid_static_obstacle.echo_age_max_s = {avoid.echo_age_max_s:g}: the robot stops until that "
-            f"sensor answers again; {more_looks(settings.ring)}, or let beams overlap"
+            f"sensor answers again; {more_looks(settings.ring)}{overlap}"
         )
     fires = settings.link.port != "ros2"  # there the sensors' own nodes do, or a simulator, which has no crosstalk
     if fires and (crosstalk := crosstalk_note(settings.ring)) is not None:

@@ -8,19 +8,18 @@ from perception.bayes.memory.elements import Reading
 from perception.bayes.memory.scratch import POLYGON
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CircleTracks, PolygonTrack, StateRecord
-from perception.bayes.memory.wall_records import RoomCorner
+from perception.bayes.memory.wall_records import CORNERS_MAX, RoomCorner
 from perception.bayes.walls.contact import (
     FOOT,
     are_mirrors,
     contact,
-    corner_of,
     edge_direction,
     edges_answer,
     explaining_wall,
     is_on_straight_span,
     wall_normal,
 )
-from perception.bayes.walls.corners import CORNER_ECHOES_MIN
+from perception.bayes.walls.corners import CORNER_ECHOES_MIN, point_of
 from perception.kernel import Floats, kernel
 from perception.shared_numbers import FAR
 
@@ -100,7 +99,7 @@ def locate_echoes(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
                         nx, ny = edge_direction(q, nx, ny, p)
                     bearing = bearing_of(q, nx, ny, p)
                 else:
-                    c = corner_of(room, q, p)
+                    c, _ = point_of(room, room.corners, CORNERS_MAX, q, p)
                     if c >= 0 and is_sure_corner(room.corners[c]):
                         bearing = bearing_of(q, room.corners[c].x - q.x, room.corners[c].y - q.y, p)
         out[s[0].scratch.fired_sensors[i]] = bearing

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from config.robot import RingConfig
 from config.settings import GridConfig
 from drivers.messages import Firing
-from perception.bounds import COUNT, FLAG, PLACE, bounds
+from perception.bounds import COUNT, PLACE, bounds
 from perception.kernel import Floats
 from perception.mapping.grid.sight_lines import SightLines
 from perception.mapping.grid.window import Ring, Window
@@ -106,7 +106,6 @@ class EvidenceGrid:
         _at=PLACE._replace(nan=True),
         _heard=COUNT,
         _firings=COUNT,
-        _are_mirrors=FLAG,
         bearings=PLACE._replace(nan=True),
     )
 
@@ -125,7 +124,7 @@ class EvidenceGrid:
         self._at = np.full(2, math.nan)
         self._heard = np.zeros(int(ring.range_max_m / HEARD_M) + 2, np.int64)
         self._firings = 0
-        self._are_mirrors = 0
+        self._are_mirrors = False
         self.bearings: Floats = np.full(len(ring.mounts), math.nan)
         """Where in its beam each echo of the next firing came from, rad from the axis; NaN where unknown."""
 
@@ -146,7 +145,7 @@ class EvidenceGrid:
         self.sight_lines.observe(firing, self.bearings, self.place, self.method.holding())
         self._firings += 1
         if slanting != 0:
-            self._are_mirrors = int(slanting < 0)
+            self._are_mirrors = slanting < 0
 
     @property
     def place(self) -> int:
@@ -222,7 +221,7 @@ class EvidenceGrid:
         self.method.clear()
         self.sight_lines.clear()
         self._heard[:] = 0
-        self._are_mirrors = 0
+        self._are_mirrors = False
         self.bearings[:] = math.nan
         self._at[:] = math.nan
         self._way_m = 0.0
