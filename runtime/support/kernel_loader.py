@@ -58,8 +58,8 @@ WARM_UP: Final = "runtime.support.kernel_warmup"
 
 KERNEL_COUNTS: Final = MappingProxyType(
     {
-        RING: 89,
-        BAYES: 254,
+        RING: 97,
+        BAYES: 288,
         POLYGONS: 66,
         PAPER: 7,
         LOCALIZATION: 26,
