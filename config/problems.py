@@ -105,7 +105,7 @@ def unknown_key(location: Location, model: type[BaseModel], also: tuple[str, ...
     """
     key = str(location[-1])
     parent = _unwrapped(_annotation_at(model, location[:-1]))
-    known = (*_fields(parent), *also)
+    known = tuple(dict.fromkeys((*_fields(parent), *also)))
     near = did_you_mean(key, known)
     elsewhere = [] if near else [dotted(p) for p in _every_location(model) if p[-1] == key][:2]
     if elsewhere:

@@ -80,8 +80,10 @@ class Difference:
     def __str__(self) -> str:
         before, after = self.before, self.after
         if _is_tables(before) and _is_tables(after):
-            others = " (others)" if len(before) == len(after) else ""
-            return f"{self.path}: {len(before)} → {len(after)} entries{others}"
+            if len(before) == len(after):
+                differ = sum(one != other for one, other in zip(before, after, strict=True))
+                return f"{self.path}: {differ} of {len(after)} entries"
+            return f"{self.path}: {len(before)} → {len(after)} entries"
         return f"{self.path}: {_shown(before)} → {_shown(after)}"
 
 

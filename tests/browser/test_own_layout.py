@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
@@ -65,6 +66,7 @@ async def test_a_mission_is_a_button_with_a_key_and_stays_after_a_reload(server:
     await page.locator("#map-front").focus()
     await page.keyboard.press("m")
     await server.wait("start_mission", 2)
+    await opened.says("#toasts", "Mission started: patrol")
     await page.locator("#route-name").fill("my m")
     await opened.sync()
     assert len(server.of("start_mission")) == 2, "a letter in a text field starts nothing"
@@ -202,9 +204,22 @@ async def test_all_plots_share_a_time_axis_that_zooms_and_moves(server: FakeServ
     assert await spans(opened) == {"30 s"}
 
 
-async def test_a_plot_has_two_axes_a_rate_and_a_difference(server: FakeServer, opener: Opener) -> None:
+async def test_a_plot_has_two_axes_a_rate_and_a_difference(
+    server: FakeServer, opener: Opener, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pose = server.hall.pose
+    monkeypatch.setattr(server.hall, "pose", lambda cycle: [*pose(cycle)[:2], pose(cycle)[2] + 4.0 * math.pi])
     opened = await plots(server, opener)
     page = opened.page
+    await page.locator("#plot-filter").fill("heading")
+    await page.get_by_label("heading", exact=True).first.check()
+    label = await page.locator('.lane[data-path="pose.heading"] canvas').get_attribute("aria-label") or ""
+    degrees = [float(one.replace("−", "-")) for one in re.findall(r"[−\d.]+", label.partition(" in ")[0])]
+    assert len(degrees) == 2, label
+    assert max(map(abs, degrees)) < 10.0, f"two turns count: {label}"
+    options = await page.get_by_label("Combine heading", exact=True).locator("option").all_inner_texts()
+    assert not [one for one in options if one.startswith("minus")], "degrees and metres have no difference"
+    await page.get_by_label("heading", exact=True).first.uncheck()
     await page.locator("#plot-filter").fill("pose")
     await page.get_by_label("pose x", exact=True).first.check()
     await page.locator("#plot-filter").fill("range")

@@ -63,6 +63,8 @@ async def test_a_wall_is_an_object_and_what_it_hides_is_not_certain(server: Fake
     await expect(page.locator("#object-1")).to_contain_text("hidden")
     await expect(page.locator("#object-2")).to_contain_text("97 %")
     await page.locator("#object-1").click()
+    await expect(page.locator("#objects")).not_to_contain_text("°")  # a disc has no heading
+    await expect(page.locator("#object-facts")).not_to_contain_text("turned by")
     await opened.says("#object-facts", "behind wall 101, where no reading checks it; before: probability 97 %")
     before = await opened.picture()
 
@@ -89,7 +91,7 @@ async def test_a_wall_is_an_object_and_what_it_hides_is_not_certain(server: Fake
     assert [m["object"] for m in server.of("evidence")] == [1, 2], "what was refused is not asked again each second"
 
 
-async def test_ring_charts_and_facts(server: FakeServer, opener: Opener) -> None:
+async def test_ring_charts_and_facts(server: FakeServer, opener: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
     server.cycle = 160
     opened = await opener.open(server.url)
     await server.advance(9)
@@ -114,6 +116,10 @@ async def test_ring_charts_and_facts(server: FakeServer, opener: Opener) -> None
     await expect(opened.page.locator("#place")).to_be_visible()
     await opened.says("#fact-recording", "2 lost")
     await opened.says("#mode-name", "DRIVE")
+    frame = server.hall.frame
+    unsure = frame(0)["localized"] | {"status": "localizing", "probability": 0.03}
+    monkeypatch.setattr(server.hall, "frame", lambda cycle: frame(cycle) | {"localized": unsure})
+    await opened.says("#fact-place", "unknown, localizing 3 %")
 
 
 async def test_the_log_can_be_searched_and_is_never_markup(server: FakeServer, opener: Opener) -> None:

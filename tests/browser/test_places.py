@@ -103,7 +103,7 @@ async def operate(case: ConsoleCase, opener: Opener, folder: Path) -> None:
     await expect(page.locator("#places-name")).to_have_value("place-1")  # the run's answer fills the form
     await page.locator("#places-name").fill("charger")
     await page.locator("#places-name").press("Enter")
-    await until_row(opened, "charger")
+    await until_row(opened, "charger 3.00, 0.00 m, 90°")
     there = settings.current.places.place[0]
     assert (there.x_m, there.y_m, there.heading_deg) == pytest.approx((3.0, 0.0, 90.0), abs=1.0)
 

@@ -93,10 +93,12 @@ async def test_a_change_is_not_lost_and_a_restart_waits_for_a_robot_that_stands(
     await page.get_by_role("button", name="Leave it unsaved").click()
     await expect(page.locator("#settings")).to_be_hidden()
     await page.click("#settings-open")
+    await page.locator("#settings-text").fill("changed once more")
     await expect(page.locator("#settings-restart")).to_be_disabled()
     server.mode = "READY"
     await expect(page.locator("#settings-restart")).to_be_enabled()
     await page.click("#settings-restart")
+    await page.get_by_role("button", name="Leave it unsaved").click()
     await page.get_by_role("button", name="Start it again").click()
     await server.wait("restart_run")
 

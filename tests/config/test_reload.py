@@ -61,7 +61,7 @@ def test_settings_that_an_operator_changes_while_driving_are_live() -> None:
 def test_lists_of_tables_are_counted() -> None:
     a, b = (PlaceConfig(name=name, x_m=0.0, y_m=0.0) for name in "ab")
     said = [str(Difference(("places", "place"), before, after)) for before, after in (((), (a,)), ((a,), (b,)))]
-    assert said == ["places.place: 0 → 1 entries", "places.place: 1 → 1 entries (others)"]
+    assert said == ["places.place: 0 → 1 entries", "places.place: 1 of 1 entries"]
 
 
 def test_adding_a_model_is_live_and_replacing_one_is_not(tmp_path: Path) -> None:

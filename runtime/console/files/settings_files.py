@@ -247,7 +247,10 @@ class SettingsFiles:
             raise CommandError(f"{document.name} comes with the program: download a copy, and name it in the command")
         before = self._read(document)
         if before["digest"] != digest:
-            raise CommandError(f"{document.name} has been changed by another program since: open it again")
+            raise CommandError(
+                f"{document.name} has changed since it was opened, by another program or by a place on the map: "
+                "download a copy of the text, then open the file again"
+            )
         if problems := self._check(document, text)["problems"]:
             raise CommandError(f"{document.name} is not saved: {problems[0]['text']}")
         if "\r\n" in before["text"]:  # a page has plain line ends

@@ -11,7 +11,7 @@ const TAKEN = new Set([..."+-=−fulpkwasd[]?123456789 "]);
 
 /**
  * @typedef {{ action: string; key: string }} Kept
- * @typedef {{ id: string; name: string; act: () => Promise<unknown> }} Offer
+ * @typedef {{ id: string; name: string; did: string; act: () => Promise<unknown> }} Offer
  */
 
 export class Buttons {
@@ -30,7 +30,8 @@ export class Buttons {
     addEventListener("keydown", (event) => this.#key(event));
   }
 
-  // Offers actions of a kind, as "mission" or "place": `list` returns what there is now, {id, name, act} each.
+  // Offers actions of a kind, as "mission" or "place": `list` returns what there is now; `did` begins what the page
+  // reports of it.
   /** @param {string} kind @param {() => Offer[]} list */
   offer(kind, list) {
     this.#offers.set(kind, list);
@@ -115,7 +116,7 @@ export class Buttons {
     if (found === undefined || !this.run.state.controller || this.run.watchesRecording) return;
     try {
       await found.act();
-      this.notifications.toast(`${found.kind} ${found.name}`);
+      this.notifications.toast(`${found.did}: ${found.name}`);
     } catch (error) {
       this.notifications.showError(error);
     }

@@ -171,6 +171,7 @@ buttons.offer("mission", () =>
   (run.session?.missions ?? []).map(({ name }) => ({
     id: name,
     name,
+    did: "Mission started",
     act: () => connection.request({ type: "start_mission", name }),
   })),
 );
@@ -178,6 +179,7 @@ buttons.offer("place", () =>
   places.all.place.map(({ name }) => ({
     id: name,
     name,
+    did: "Goal",
     act: () => connection.request({ type: "go_to_place", name }),
   })),
 );

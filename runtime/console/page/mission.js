@@ -63,7 +63,7 @@ export class MissionPanel extends Panel {
 }
 
 /** @param {StepRow} step */
-function stepRow({ name, schemas, until }) {
+function stepRow({ name, schemas, place, until }) {
   /** @param {string} go */
   const lead = (go) => (go === "next" ? "next step" : go);
   return el(
@@ -71,6 +71,7 @@ function stepRow({ name, schemas, until }) {
     {},
     el("strong", {}, name),
     ` ${schemas.join(" + ").replaceAll("_", "-") || "stand"}`,
+    place === null ? null : el("em", {}, ` ${place}`),
     el("ul", {}, ...until.map(([when, go]) => el("li", {}, `${when} → ${lead(go)}`))),
   );
 }

@@ -68,11 +68,12 @@ export class Notifications {
     setText(byId("dialog-title"), title);
     byId("dialog-body").replaceChildren(body);
     byId("dialog-buttons").replaceChildren(
-      ...buttons.map(([label, act]) =>
-        button(label, () => {
-          if (act?.() !== false) this.close();
-        }),
-      ),
+      ...buttons.map(([label, act]) => {
+        const answer = button(label, () => {
+          if (act?.() !== false && answer.isConnected) this.close(); // an answer may have asked the next question
+        });
+        return answer;
+      }),
     );
     if (!this.#dialog.open) this.#dialog.show();
     const last = byId("dialog-buttons").lastElementChild;

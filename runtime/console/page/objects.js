@@ -68,7 +68,9 @@ export class Objects extends Panel {
       setText(row.sure, certainty(object));
       setText(
         row.where,
-        object.ends ? this.#between(object.ends) : `${this.units.place(object.x, object.y)}, ${degrees(object.theta)}`,
+        object.ends
+          ? this.#between(object.ends)
+          : [this.units.place(object.x, object.y), ...this.#turn(object, null)].join(", "),
       );
       setText(row.off, object.ends ? `${this.#long(object.ends)} long` : this.units.spread(object.sigma));
       const picked = object.number !== null && object.number === this.selection.object;
@@ -105,6 +107,13 @@ export class Objects extends Panel {
       ...Object.values(parts),
     );
     return { element, ...parts };
+  }
+
+  // Its heading; a disc has none.
+  /** @param {ObjectRow} object @param {number | null} sigma */
+  #turn({ model, theta }, sigma) {
+    const { arc_radius_m: radius = null, closed = false } = this.run.model(model) ?? {};
+    return radius !== null && closed ? [] : [degrees(theta, sigma)];
   }
 
   // The ends of a wall, and how long it is.
@@ -177,7 +186,7 @@ export class Objects extends Panel {
           : `behind wall ${object.hidden_by}, where no reading checks it; before: ${chance}`,
       ],
       ["place", isWall(object) ? this.#between(object.ends) : this.units.place(object.x, object.y, 3)],
-      ["turned by", degrees(object.theta, object.sigma_theta)],
+      ...this.#turn(object, object.sigma_theta).map((turn) => ["turned by", turn]),
       isWall(object) ? ["length", this.#long(object.ends)] : ["uncertainty", this.units.spread(object.sigma)],
     ];
     if (object.covariance && !isWall(object)) {

@@ -161,7 +161,7 @@ export class PlacesPanel extends Panel {
     const name = row.name || `${KINDS[kind]} ${i + 1}`;
     const what =
       "x_m" in row
-        ? this.units.place(row.x_m, row.y_m)
+        ? `${this.units.place(row.x_m, row.y_m)}${row.heading_deg === null ? "" : `, ${row.heading_deg}°`}`
         : "speed_max_m_s" in row
           ? `at most ${row.speed_max_m_s} m/s`
           : `${row.name ? `${KINDS[kind]}, ` : ""}${cornersOf(row).length} corners`;

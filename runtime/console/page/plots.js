@@ -172,7 +172,8 @@ export class Plots {
     const others = [...this.#lanes]
       .filter(([other, lane]) => other !== path && lane.second === null)
       .map(([other]) => other);
-    const plain = others.filter((one) => !isDerived(one) && !isDerived(path));
+    const { name } = shownAs(path, this.units); // values of two units have no difference
+    const plain = others.filter((one) => !isDerived(one) && !isDerived(path) && shownAs(one, this.units).name === name);
     const options = [
       ["", "combine…"],
       ...(isDerived(path) ? [] : [["rate", "its rate"]]),
@@ -259,8 +260,10 @@ export class Plots {
 
   /** @param {string} path @param {Span} span @returns {TimedValue[]} */
   #points(path, { from, to }) {
-    const { factor } = shownAs(path, this.units);
-    return seriesOf(this.#history, path, from, to).map(([t, one]) => [t, one === null ? null : one * factor]);
+    const { factor, isAngle } = shownAs(path, this.units);
+    /** @param {number} one */
+    const within = (one) => (isAngle ? one - 360 * Math.round(one / 360) : one); // the robot may have turned often
+    return seriesOf(this.#history, path, from, to).map(([t, one]) => [t, one === null ? null : within(one * factor)]);
   }
 
   /** @param {string} path @param {Lane} lane @param {Span} span @param {number} read @param {number} margins */

@@ -136,7 +136,8 @@ export class Status extends Panel {
   /** @param {LocalizedRow} localized */
   #place({ pose: [x, y, theta], covariance, status, probability }) {
     const said = `${status} ${percent(probability)}`;
-    if (covariance === null) return `unknown, ${said}`;
+    // What is likely wrong has no place, however exact it would be.
+    if (covariance === null || (status !== "tracking" && probability < 0.5)) return `unknown, ${said}`;
     const [xx, xy, yy, heading] = covariance;
     const sigma = Math.sqrt((xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy));
     const place = `${this.units.number(x)}, ${this.units.number(y)} ${this.units.spread(sigma)}`;
