@@ -149,13 +149,8 @@ def limit_velocity(
     forward, in proportion to its speed. Forward and backward, the speed is limited to what the robot can stop from
     before the nearest echo in that direction, and before what it has seen there is too old. Turning on the spot is
     not limited: it needs no room.
-
-    Parameters
-    ----------
-    requested
-        The velocity; its v divided by the base velocity is the request's vector along the heading.
-    responses, percept, body, config, expected
-        As for `arbitrate`.
+    `requested`: the velocity; its v divided by the base velocity is the request's vector along the heading.
+    `responses`, `percept`, `body`, `config`, `expected`: as for `arbitrate`.
 
     Returns
     -------

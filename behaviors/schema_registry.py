@@ -55,12 +55,8 @@ class PluggedUse(Protocol):
 def ahead_in_step(scene: Scene, memory: Memory, use: MoveAheadUse) -> Answer:
     """Return the vector along a direction, and whether the step's distance along it is behind the robot.
 
-    Parameters
-    ----------
-    scene, memory
-        The pose now and as the step began; the memory is not used.
-    use
-        Direction, distance and gain.
+    `scene`, `memory`: the pose now and as the step began; the memory is not used. `use`: direction, distance and
+    gain.
     """
     turned = scene.start.theta if use.relative_to == "robot" else 0.0
     direction = turned + math.radians(use.direction_deg)
@@ -123,15 +119,7 @@ def steering_in_step(scene: Scene, memory: Memory, use: FollowValleyUse | LeaveC
     """Return a vector of zero: `runtime.cycle.goal_drive` lets the schema turn that of the others.
 
     The response is needed all the same: the arbiter stops a robot of which a schema does not respond.
-
-    Parameters
-    ----------
-    scene
-        Not used.
-    memory
-        Handed back.
-    use
-        The schema.
+    `scene`: not used. `memory`: handed back. `use`: the schema.
     """
     del scene
     return Answer(Response(use.name, 0.0, 0.0), memory)
@@ -140,14 +128,7 @@ def steering_in_step(scene: Scene, memory: Memory, use: FollowValleyUse | LeaveC
 def avoid_past_in_step(scene: Scene, memory: Memory, use: AvoidPastUse) -> Answer:
     """Return the vector away from where the robot has been in this step.
 
-    Parameters
-    ----------
-    scene
-        The pose.
-    memory
-        `trail`: where the robot has been.
-    use
-        The gain.
+    `scene`: the pose. `memory`: `trail`: where the robot has been. `use`: the gain.
     """
     config = scene.behaviors.avoid_past.model_copy(update={"avoid_past_gain": use.gain})
     response, trail = avoid_past(scene.percept, memory.trail, config)
@@ -157,14 +138,7 @@ def avoid_past_in_step(scene: Scene, memory: Memory, use: AvoidPastUse) -> Answe
 def noise_in_step(scene: Scene, memory: Memory, use: NoiseUse) -> Answer:
     """Return a random vector.
 
-    Parameters
-    ----------
-    scene
-        The time.
-    memory
-        Not used.
-    use
-        The gain.
+    `scene`: the time. `memory`: not used. `use`: the gain.
     """
     config = scene.behaviors.noise.model_copy(update={"noise_gain": use.gain})
     return Answer(noise(scene.run_s, config), memory)
@@ -173,14 +147,7 @@ def noise_in_step(scene: Scene, memory: Memory, use: NoiseUse) -> Answer:
 def swirl_in_step(scene: Scene, memory: Memory, use: SwirlUse) -> Answer:
     """Return the vector round obstacles.
 
-    Parameters
-    ----------
-    scene
-        Obstacles, and where the other schemas lead.
-    memory
-        Not used.
-    use
-        The gain.
+    `scene`: obstacles, and where the other schemas lead. `memory`: not used. `use`: the gain.
     """
     config = scene.behaviors.swirl.model_copy(update={"swirl_gain": use.gain})
     way_rad = scene.percept.pose.theta if scene.way_rad is None else scene.way_rad
@@ -210,10 +177,7 @@ SCHEMAS: Final[Mapping[str, Schema]] = MappingProxyType(
 def schema_of(use: Use) -> Schema:
     """Return the function of a schema in a step.
 
-    Parameters
-    ----------
-    use
-        The schema with its settings; one of an installed package brings its function with it.
+    `use`: the schema with its settings; one of an installed package brings its function with it.
     """
     shipped = SCHEMAS.get(use.name)
     return _own_answer if shipped is None else shipped

@@ -17,12 +17,7 @@ numbers."""
 def exp(x: float, y: float, theta: float) -> Pose:
     """Return the pose that a constant twist reaches from the origin in unit time.
 
-    Parameters
-    ----------
-    x, y
-        Velocity, m per unit time.
-    theta
-        Turning rate, rad per unit time.
+    `x`, `y`: velocity, m per unit time. `theta`: turning rate, rad per unit time.
 
     Notes
     -----

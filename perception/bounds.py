@@ -80,12 +80,8 @@ def up_to(most: int) -> Bound:
 def bounds(inner: Mapping[str, Declared] | None = None, /, **attributes: Declared) -> Mapping[str, Declared]:
     """Return what a class declares in `BOUNDS`.
 
-    Parameters
-    ----------
-    inner : mapping
-        By dotted name: fields of the object's parts whose bounds only this object knows, as the models are its own.
-    **attributes
-        By the name of the object's own attribute. Flags of dtype bool need no declaration.
+    `inner`: by dotted name: fields of the object's parts whose bounds only this object knows, as the models are its
+    own. `attributes`: by the name of the object's own attribute. Flags of dtype bool need no declaration.
     """
     return MappingProxyType({**attributes, **(inner or {})})
 

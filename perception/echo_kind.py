@@ -151,12 +151,7 @@ def _path_function(kind: Kind, radius_m: float, t: np.ndarray, listener: np.ndar
 def half_paths_over_circle(t: np.ndarray, listener: np.ndarray, centre: complex, radius_m: float) -> Floats:
     """Return half the shortest way over a circle between pairs of points outside it (Alhazen's problem).
 
-    Parameters
-    ----------
-    t, listener
-        The points as complex numbers, shape (n,), m.
-    centre, radius_m
-        The circle, m.
+    `t`, `listener`: the points as complex numbers, shape (n,), m. `centre`, `radius_m`: the circle, m.
 
     Returns
     -------

@@ -30,10 +30,7 @@ FOREIGN: Final = ("builtins", "math", "numba", "numpy")
 def tools_digest(compiler: Mapping[str, object]) -> str:
     """Return a digest of what compiles: versions, checks of bounds, and the functions of our compiler's module.
 
-    Parameters
-    ----------
-    compiler : mapping
-        The names of the module `perception.kernel_compiler`.
+    `compiler`: the names of the module `perception.kernel_compiler`.
     """
     digest = hashlib.sha256()
     versions = (PYVERSION, numba.__version__, llvmlite.__version__, np.__version__)
@@ -61,10 +58,7 @@ def _functions(value: object, module: str) -> Iterator[FunctionType]:
 class KernelDigests:
     """The digests of kernels; each is computed once.
 
-    Parameters
-    ----------
-    tools : str
-        From `tools_digest`.
+    `tools`: from `tools_digest`.
     """
 
     def __init__(self, tools: str) -> None:

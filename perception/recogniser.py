@@ -22,14 +22,8 @@ __all__ = ["Recogniser"]
 class Recogniser:
     """Recognises objects in the readings of a ring of sonars, firing by firing.
 
-    Parameters
-    ----------
-    ring : RingConfig
-        The sensors, as in ``config.load.load_robot("p3dx").ring``.
-    models : sequence of ModelConfig
-        The objects to recognise, as in ``[config.load.load_model("drum")]``.
-    config : PerceptionConfig, optional
-        The method and its settings.
+    `ring`: the sensors, as in ``config.load.load_robot("p3dx").ring``. `models`: the objects to recognise, as in
+    ``[config.load.load_model("drum")]``. `config`: the method and its settings.
 
     Attributes
     ----------

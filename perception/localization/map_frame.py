@@ -42,12 +42,7 @@ SHIFT_MIN_M: Final = 0.002
 class MapFrame(OdometryFrame):
     """Poses corrected by what is recognised, and conversions between the frames.
 
-    Parameters
-    ----------
-    ring : RingConfig
-        The sensors.
-    models : sequence of ModelConfig
-        The objects to recognise; the round ones become landmarks.
+    `ring`: the sensors. `models`: the objects to recognise; the round ones become landmarks.
 
     Attributes
     ----------

@@ -24,12 +24,8 @@ START: Final = 16
 class Archive:
     """Records with a number and a place, under a grid.
 
-    Parameters
-    ----------
-    dtype : dtype
-        Of a record; its fields `number` (int), `x` and `y` (m) are used here.
-    row_bounds : mapping
-        Bounds of its fields.
+    `dtype`: of a record; its fields `number` (int), `x` and `y` (m) are used here. `row_bounds`: bounds of its
+    fields.
 
     Attributes
     ----------
@@ -88,10 +84,7 @@ class Archive:
     def near(self, x: float, y: float, radius: float) -> list[int]:
         """Return the numbers of the records within `radius` of (x, y), m, the nearest first.
 
-        Parameters
-        ----------
-        x, y, radius : float
-            m.
+        `x`, `y`, `radius`: m.
         """
         found: list[int] = []
         low, high = self._cell(x - radius, y - radius), self._cell(x + radius, y + radius)

@@ -62,10 +62,7 @@ class NoSurfaces:
     ) -> SurfaceReport:
         """Return walls and polylines beside what the method reports; the same tuples until they change.
 
-        Parameters
-        ----------
-        known : callable
-            Returns what the method reports.
+        `known`: returns what the method reports.
         """
         return SurfaceReport()
 

@@ -199,10 +199,7 @@ def find_ahead(pose: RingPose, half_width: float, echoes: Records[RememberedEcho
 class RememberedEchoes:
     """What a ring has heard in the last seconds.
 
-    Parameters
-    ----------
-    sensor_of : tuple of int
-        As `config.robot.RingConfig.sensor_of`.
+    `sensor_of`: as `config.robot.RingConfig.sensor_of`.
     """
 
     SCRATCH: Final = ("_echo_records", "_heard_records")

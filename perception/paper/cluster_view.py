@@ -36,10 +36,7 @@ class ClusterBox(NamedTuple):
 class ClusterView:
     """Groups segments as the paper's method does.
 
-    Parameters
-    ----------
-    config : PerceptionConfig
-        The threshold T, the least number of segments of a cluster, and the greatest number of clusters.
+    `config`: the threshold T, the least number of segments of a cluster, and the greatest number of clusters.
     """
 
     def __init__(self, config: PerceptionConfig) -> None:
@@ -50,10 +47,7 @@ class ClusterView:
     def boxes(self, segments: Floats) -> list[ClusterBox]:
         """Return the clusters of these segments.
 
-        Parameters
-        ----------
-        segments : (n, 5) float
-            End points x1, y1, x2, y2 (m), direction of the normal (rad).
+        `segments`, shape (n, 5): end points x1, y1, x2, y2 (m), direction of the normal (rad).
         """
         n = len(segments)
         if n == 0:

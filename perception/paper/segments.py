@@ -51,15 +51,8 @@ def tangent(
 
     A line n·x = c touches both circles where n·P1 + r1 = n·P2 + r2 = c, so that cos(α − φ) = (r1 − r2)/L for the
     direction α of n, with L and φ the length and direction of P2 − P1 (McKerrow 1993; paper §3.2, Figure 2).
-
-    Parameters
-    ----------
-    x1, y1, axis1, r1 : float
-        First reading: place of the sensor (m), direction of its axis (rad), range (m).
-    x2, y2, axis2, r2 : float
-        Second reading.
-    half_angle : float
-        Half the beam's width, rad: the arcs end there.
+    `x1`, `y1`, `axis1`, `r1`: first reading: place of the sensor (m), direction of its axis (rad), range (m). `x2`,
+    `y2`, `axis2`, `r2`: second reading. `half_angle`: half the beam's width, rad: the arcs end there.
 
     Returns
     -------
@@ -169,12 +162,7 @@ def pair_readings(
 class SegmentExtractor:
     """Turns firings into outline segments; keeps each sensor's last readings.
 
-    Parameters
-    ----------
-    ring : RingConfig
-        Mounts and beam width of the sensors.
-    config : SegmentsConfig
-        Which readings are paired.
+    `ring`: mounts and beam width of the sensors. `config`: which readings are paired.
     """
 
     SCRATCH: Final = ("_out", "_sensor_records")

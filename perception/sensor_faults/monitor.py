@@ -60,12 +60,8 @@ TOLERANCE_STEPS: Final = 1.1
 def neighbours_of(axes: Floats, turning: tuple[int, ...] = ()) -> Ints:
     """Return the sensors that look next to each one on the left and on the right.
 
-    Parameters
-    ----------
-    axes : (n,) float
-        Direction of each sensor in the ring, rad.
-    turning : tuple of int
-        The sensors that turn with the wheels: none of them is the neighbour of one that does not.
+    `axes`, shape (n,): direction of each sensor in the ring, rad. `turning`: the sensors that turn with the wheels:
+    none of them is the neighbour of one that does not.
 
     Returns
     -------
@@ -111,10 +107,7 @@ def are_sound(sensors: Records[SensorMemory]) -> bool:
 class SensorMonitor:
     """Removes untrustworthy readings from firings.
 
-    Parameters
-    ----------
-    ring : RingConfig
-        The sensors, and which of them should fire.
+    `ring`: the sensors, and which of them should fire.
 
     Attributes
     ----------

@@ -53,14 +53,8 @@ class Run:
 def expand(study: StudyConfig, base: Path, varied: Sequence[Mapping[str, Value]] | None = None) -> list[Run]:
     """Return the runs of a study, each once, settings after settings.
 
-    Parameters
-    ----------
-    study : StudyConfig
-        The study.
-    base : Path
-        Its folder, to which paths in it are relative.
-    varied : sequence of mapping, optional
-        Values of settings by name; by default every combination of the study.
+    `base`: its folder, to which paths in it are relative. `varied`: values of settings by name; by default every
+    combination of the study.
 
     Raises
     ------

@@ -30,11 +30,7 @@ def study_to_tune(name: str) -> tuple[StudyConfig, Path]:
 
     Settings to search among and objectives that the study leaves out are added: `THRESHOLDS` where the truth is
     known, `SENSORS` where there are recordings.
-
-    Parameters
-    ----------
-    name : str
-        A shipped study, a study file, or a folder of recordings.
+    `name`: a shipped study, a study file, or a folder of recordings.
 
     Raises
     ------

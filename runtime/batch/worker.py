@@ -109,12 +109,8 @@ def scene_figures(settings: Settings, scene: str, seed: int) -> Row:
 def recording_figures(settings: Settings, run: Run) -> Row:
     """Return the figures of a replay; without a true world only those that need none.
 
-    Parameters
-    ----------
-    settings : Settings
-        Of a ring log; a recording (MCAP) contains its own.
-    run : Run
-        The file, what differs from the settings in it, and the true world.
+    `settings`: of a ring log; a recording (MCAP) contains its own. `run`: the file, what differs from the settings in
+    it, and the true world.
 
     Raises
     ------

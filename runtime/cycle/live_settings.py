@@ -23,10 +23,7 @@ returns why that is impossible, None if the change can be applied."""
 class LiveSettings:
     """The settings in force, those before them, and who is notified of a change.
 
-    Parameters
-    ----------
-    settings : Settings
-        What the run starts with.
+    `settings`: what the run starts with.
 
     Attributes
     ----------

@@ -109,14 +109,8 @@ class RunningPreparation:
     async def start(self, settings: Settings, connection: Connects, is_stopping: Callable[[], bool]) -> None:
         """Prepare what the first cycle needs and connect; go on to prepare recognition beside that and the cycles.
 
-        Parameters
-        ----------
-        settings : Settings
-            Of the run.
-        connection : Connects
-            Connects to the robot, before everything is prepared if that will fail.
-        is_stopping : callable
-            Whether the run is ending.
+        `settings`: of the run. `connection`: connects to the robot, before everything is prepared if that will fail.
+        `is_stopping`: whether the run is ending.
         """
         if self._preparation is not None:
             await self._prepare_ring(self._preparation, settings, connection, is_stopping)

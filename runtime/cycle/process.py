@@ -208,12 +208,8 @@ class RobotProcess:
     async def run(self, *, arm: bool, seconds: float | None) -> RunSummary:
         """Run until `stop` is called or `seconds` have passed, and return the summary.
 
-        Parameters
-        ----------
-        arm : bool
-            Arm once, as soon as the robot is ready.
-        seconds : float, optional
-            Counted from the first cycle with recognition, by the run's clock.
+        `arm`: arm once, as soon as the robot is ready. `seconds`: counted from the first cycle with recognition, by
+        the run's clock.
 
         Raises
         ------

@@ -26,14 +26,8 @@ CHUNK_BYTES: Final = 256 * 1024
 class McapFile:
     """An open MCAP file. Every method raises OSError if the disk fails.
 
-    Parameters
-    ----------
-    path : Path
-        Replaced if it exists.
-    info : bytes
-        The first message, written in a chunk of its own with schemas and channels.
-    log_ns : int
-        Its log time, Unix time in ns.
+    `path`: replaced if it exists. `info`: the first message, written in a chunk of its own with schemas and channels.
+    `log_ns`: its log time, Unix time in ns.
 
     Raises
     ------

@@ -97,10 +97,7 @@ def frame_bytes(data: memoryview, at: int) -> int:
 class McapScanner:
     """Reader of everything readable in a file's bytes.
 
-    Parameters
-    ----------
-    data : memoryview
-        The whole file; may be memory-mapped.
+    `data`: the whole file; may be memory-mapped.
 
     Attributes
     ----------

@@ -201,14 +201,8 @@ def check_origin(path: Path, scanner: McapScanner) -> None:
 def check_format(path: Path, scanner: McapScanner, info: RunInfo | None = None) -> None:
     """Refuse a recording of another format version.
 
-    Parameters
-    ----------
-    path : Path
-        The file, for the message.
-    scanner : McapScanner
-        Of the file.
-    info : RunInfo, optional
-        The file's first message. Its version counts more than the header's, which no checksum protects.
+    `path`: the file, for the message. `scanner`: of the file. `info`: the file's first message. Its version counts
+    more than the header's, which no checksum protects.
 
     Raises
     ------

@@ -70,14 +70,8 @@ def software_versions() -> dict[str, str]:
 def run_info(settings: Settings, host_clock: Callable[[], float], *, emulated: bool) -> RunInfo:
     """Return the first message of a recording that starts now.
 
-    Parameters
-    ----------
-    settings : Settings
-        The run's.
-    host_clock : callable
-        The host's monotonic clock, s. Its difference to Unix time is fixed here, for all log times.
-    emulated : bool
-        Whether the settings' world is the true one.
+    `settings`: the run's. `host_clock`: the host's monotonic clock, s. Its difference to Unix time is fixed here, for
+    all log times. `emulated`: whether the settings' world is the true one.
     """
     return RunInfo(
         format=FORMAT,

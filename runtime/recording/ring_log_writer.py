@@ -25,14 +25,8 @@ QUEUE_MAX: Final = 4096
 class RingLogWriter:
     """Writer of a ring log. As a context manager it starts and stops the writing.
 
-    Parameters
-    ----------
-    path : Path
-        Replaced if it exists.
-    pairs : sequence of tuple
-        The cross paths of the firing pattern, (transmitter, listener): those of a later one have no column.
-    servos : ServoColumns, optional
-        The bearings of the ring.
+    `path`: replaced if it exists. `pairs`: the cross paths of the firing pattern, (transmitter, listener): those of a
+    later one have no column. `servos`: the bearings of the ring.
     """
 
     def __init__(self, path: Path, pairs: Sequence[tuple[int, int]] = (), servos: ServoColumns | None = None) -> None:

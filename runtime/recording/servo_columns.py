@@ -27,10 +27,7 @@ HINT: Final = (
 class ServoColumns:
     """The columns of a ring's bearings.
 
-    Parameters
-    ----------
-    ring : RingConfig
-        The ring; without servos rows pass as they are.
+    `ring`: the ring; without servos rows pass as they are.
 
     Attributes
     ----------
@@ -53,12 +50,8 @@ class ServoColumns:
     def mounts(self, ranges: Floats, bearings: Sequence[float]) -> Floats:
         """Return the ranges of a row by mount.
 
-        Parameters
-        ----------
-        ranges : (sensors,) float
-            NaN where a sensor did not fire.
-        bearings : sequence of float
-            Of `sensors`, rad; NaN where a cell is empty.
+        `ranges`, shape (sensors,): NaN where a sensor did not fire. `bearings`: of `sensors`, rad; NaN where a cell
+        is empty.
 
         Raises
         ------

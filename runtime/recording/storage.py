@@ -138,15 +138,8 @@ class RotatingFolder:
     oldest that fits goes. Pinned files, beside which an empty `NAME.mcap.keep` lies, stay and do not count. A file
     with a bookmark is pinned. Files that the folder's index does not list stay and do not count either. Nor do the
     files of another run go while it is writing one of them.
-
-    Parameters
-    ----------
-    folder : Path
-        Created if it is missing.
-    run : str
-        Prefix of this run's file names; names sort by time. Another is taken where files have it already.
-    config : RecordingConfig
-        The limits.
+    `folder`: created if it is missing. `run`: prefix of this run's file names; names sort by time. Another is taken
+    where files have it already. `config`: the limits.
     """
 
     folder: Path

@@ -113,14 +113,8 @@ class RecorderStatus:
 class RecordingWriter:
     """A recording and the thread that writes it.
 
-    Parameters
-    ----------
-    info : RunInfo
-        The first message of each file.
-    host_clock : callable
-        The host's clock of the run, s, for the log time of `info`.
-    on : bool
-        Whether to record from the start.
+    `info`: the first message of each file. `host_clock`: the host's clock of the run, s, for the log time of `info`.
+    `on`: whether to record from the start.
 
     Attributes
     ----------

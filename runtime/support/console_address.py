@@ -72,12 +72,8 @@ def find_consoles(folder: Path) -> list[str]:
 def find_console(folder: Path, address: str | None = None) -> str:
     """Return the start URL of the newest run, or of the run at an address that is given without its token.
 
-    Parameters
-    ----------
-    folder : Path
-        As of `find_consoles`, and it raises the same.
-    address : str, optional
-        URL of a run's page. One with a token, or of no run on this machine, is returned as it is.
+    `folder`: as of `find_consoles`, and it raises the same. `address`: URL of a run's page. One with a token, or of
+    no run on this machine, is returned as it is.
     """
     if address is None:
         return find_consoles(folder)[0]

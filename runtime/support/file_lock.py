@@ -26,13 +26,7 @@ def file_lock(path: Path, named: str) -> Iterator[None]:
     """Lock the file at `path` during the block; create it if it does not exist, and leave its content untouched.
 
     Only regular files are locked: a pipe or /dev/null has no content that two writers could spoil.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    named : str
-        How an error message names it, e.g. ``--record run.csv``.
+    `path`: the file. `named`: how an error message names it, e.g. ``--record run.csv``.
 
     Raises
     ------

@@ -75,14 +75,8 @@ class ForkedChild:
 async def fork(main: Callable[[], None], arguments: Sequence[str], environment: Mapping[str, str]) -> ForkedChild:
     """Call `main` in a copy of this process, in a session of its own, with pipes as its standard streams.
 
-    Parameters
-    ----------
-    main : callable
-        Runs the program, as if it had just been started; its end is that of the process.
-    arguments : sequence of str
-        Of the program, without its name.
-    environment : mapping
-        Variables of its environment beside those of this process.
+    `main`: runs the program, as if it had just been started; its end is that of the process. `arguments`: of the
+    program, without its name. `environment`: variables of its environment beside those of this process.
 
     Raises
     ------

@@ -24,12 +24,7 @@ _BYTES_MAX: Final = 200
 def kept_token(folder: Path, make: Callable[[], str]) -> str:
     """Return the token that is kept in a folder; make and keep one if there is none.
 
-    Parameters
-    ----------
-    folder : Path
-        The program's state folder; created if it does not exist.
-    make : callable
-        Returns a new token.
+    `folder`: the program's state folder; created if it does not exist. `make`: returns a new token.
 
     Raises
     ------

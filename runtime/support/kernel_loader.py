@@ -97,14 +97,8 @@ class InThread(Protocol):
 class KernelLoader:
     """Prepare kernels while the robot drives.
 
-    Parameters
-    ----------
-    log : structlog logger
-        Receives a line when kernels have to be compiled.
-    compile_part : callable, optional
-        Compiles a part in another process.
-    preparation : KernelPreparation, optional
-        Is waited for: else what it loads meanwhile would be counted twice.
+    `log`: receives a line when kernels have to be compiled. `compile_part`: compiles a part in another process.
+    `preparation`: is waited for: else what it loads meanwhile would be counted twice.
 
     Attributes
     ----------
@@ -154,13 +148,7 @@ class KernelPreparation:
 
     Another process compiles what never was, at low priority; then a thread loads all. The emulator runs uncompiled
     meanwhile; its kernels are compiled last, for the next start.
-
-    Parameters
-    ----------
-    parts : sequence of str
-        Those of `PARTS` that the run needs, the emulator's among them if it has one.
-    host_clock : callable
-        Monotonic, s.
+    `parts`: those of `PARTS` that the run needs, the emulator's among them if it has one. `host_clock`: monotonic, s.
 
     Attributes
     ----------
@@ -280,14 +268,8 @@ def begin_preparation(settings: Settings) -> KernelPreparation | None:
 def progress_text(done: int, expected: int, elapsed_s: float, what: str = PREPARING) -> str:
     """Return how far compiling is, for the operator.
 
-    Parameters
-    ----------
-    done, expected : int
-        Kernels compiled, of how many.
-    elapsed_s : float
-        Since the start, s.
-    what : str
-        What is being compiled.
+    `done`, `expected`: kernels compiled, of how many. `elapsed_s`: since the start, s. `what`: what is being
+    compiled.
     """
     text = f"{what}: {done} of {expected} kernels"
     if done >= expected or done < expected * SHARE_MIN:

@@ -24,13 +24,8 @@ HEAD_LINES: Final = 10
 class LogFile:
     """An open log file. Every method raises OSError if the disk fails.
 
-    Parameters
-    ----------
-    path : Path
-        Created if it does not exist, with its folder; only this user may read it. A device or a pipe is written to
-        as it is.
-    bytes_max : int
-        Size at which a file is full.
+    `path`: created if it does not exist, with its folder; only this user may read it. A device or a pipe is written
+    to as it is. `bytes_max`: size at which a file is full.
 
     Raises
     ------

@@ -21,12 +21,8 @@ STATUS_MAX: Final = 400
 class SdNotifier:
     """Sends messages to the service manager; does nothing without one.
 
-    Parameters
-    ----------
-    address : str, optional
-        Path of the socket, or its abstract name after an ``@``.
-    watchdog_s : float, optional
-        Timeout of the manager's watchdog; None without a watchdog.
+    `address`: path of the socket, or its abstract name after an ``@``. `watchdog_s`: timeout of the manager's
+    watchdog; None without a watchdog.
 
     Attributes
     ----------

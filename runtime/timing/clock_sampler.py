@@ -40,10 +40,7 @@ class ClockSample(NamedTuple):
 class ClockSampler:
     """Reads the clocks of the calling thread.
 
-    Parameters
-    ----------
-    clock : callable
-        The run's, or any monotonic clock, s.
+    `clock`: the run's, or any monotonic clock, s.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:

@@ -39,10 +39,7 @@ class FootprintRow(TypedDict):
 class Footprint:
     """Measures this process from now, when the first cycle is about to begin, to `close`.
 
-    Parameters
-    ----------
-    memory : MemoryPolicy
-        Counts the collections.
+    `memory`: counts the collections.
     """
 
     def __init__(self, memory: MemoryPolicy) -> None:

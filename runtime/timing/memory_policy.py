@@ -39,10 +39,7 @@ def no_collection() -> Iterator[None]:
 class MemoryPolicy:
     """Decides when garbage is collected, and counts collections.
 
-    Parameters
-    ----------
-    collect : callable
-        Collects the objects of a generation and of the younger ones.
+    `collect`: collects the objects of a generation and of the younger ones.
 
     Attributes
     ----------

@@ -84,12 +84,7 @@ class NoTimeControl:
 class EmulatorTimeControl:
     """Controls the time of an emulator and of the run on it.
 
-    Parameters
-    ----------
-    send : callable
-        Sends a line to the emulator.
-    clock : ScaledClock
-        The run's; the process must use the same one.
+    `send`: sends a line to the emulator. `clock`: the run's; the process must use the same one.
     """
 
     def __init__(self, send: Callable[[bytes], None], clock: ScaledClock) -> None:

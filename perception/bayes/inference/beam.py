@@ -58,15 +58,8 @@ def ray_over_circle(
 
     A circle that lies past the ray by an angle π, of which its own half width takes ω, counts as φ + π − ω off the
     axis, with φ half the beam's opening.
-
-    Parameters
-    ----------
-    q, half_angle, rays
-        As for `nearest_ray`.
-    dx, dy, d : float
-        The circle's centre from the sensor, and its distance, m.
-    radius : float
-        m
+    `q`, `half_angle`, `rays`: as for `nearest_ray`. `dx`, `dy`, `d`: the circle's centre from the sensor, and its
+    distance, m. `radius`: m.
 
     Returns
     -------

@@ -177,14 +177,8 @@ def copied(p: SettingsRecord) -> SettingsRecord:
 def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: BayesConfig) -> SettingsRecord:
     """Return the settings for a ring, a library and a configuration.
 
-    Parameters
-    ----------
-    ring : RingConfig
-        Beam, resolution and range.
-    models : sequence of ModelConfig
-        The library: round ones by their radius, the others by their outline.
-    config : BayesConfig
-        The settings that a user may change.
+    `ring`: beam, resolution and range. `models`: the library: round ones by their radius, the others by their
+    outline. `config`: the settings that a user may change.
 
     Raises
     ------

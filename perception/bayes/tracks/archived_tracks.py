@@ -33,11 +33,7 @@ def free_row(tracks: Structured) -> int:
     """Return a free track's row, else that of the unmarked tentative one with the least evidence, else −1.
 
     It is `track_labels.free_track` for what no kernel calls.
-
-    Parameters
-    ----------
-    tracks : (n,) record of `CircleTrack` or `PolygonTrack`
-        The tracks.
+    `tracks`, shape (n,): the tracks.
     """
     status = tracks["status"]
     free = np.flatnonzero(status == FREE)
@@ -69,14 +65,7 @@ def archived_bounds(track: type[CircleTrack | PolygonTrack]) -> Fields:
 def pack(track: Structured, dtype: np.dtype[Any], *, is_reported: bool) -> Structured:
     """Return a track as an archived record, shape (1,).
 
-    Parameters
-    ----------
-    track : (1,) record of `CircleTrack` or `PolygonTrack`
-        The track.
-    dtype : dtype
-        From `archived_dtype`.
-    is_reported : bool
-        Whether it is reported as a model.
+    `track`, shape (1,): the track. `dtype`: from `archived_dtype`. `is_reported`: whether it is reported as a model.
     """
     row = np.zeros(1, dtype)
     _copy_numbers(track, row)
@@ -92,12 +81,7 @@ def pack(track: Structured, dtype: np.dtype[Any], *, is_reported: bool) -> Struc
 def unpack(row: Structured, track: Structured) -> None:
     """Write an archived record to a track.
 
-    Parameters
-    ----------
-    row : (1,) record of `archived_dtype`
-        The archived track.
-    track : (1,) record of `CircleTrack` or `PolygonTrack`
-        Overwritten.
+    `row`, shape (1,): the archived track. `track`, shape (1,): overwritten.
     """
     _copy_numbers(row, track)
     bins = track[BINS][0]
@@ -118,12 +102,7 @@ def unpack(row: Structured, track: Structured) -> None:
 def move_rows(rows: Structured, moves: MapMoves) -> None:
     """Move archived tracks with their maps of the way; corrections turn too little to turn covariances.
 
-    Parameters
-    ----------
-    rows : (n,) record of `archived_dtype`
-        Updated.
-    moves : MapMoves
-        Of the maps.
+    `rows`, shape (n,): updated.
     """
     for place in (rows, rows["challenger"]) if "challenger" in (rows.dtype.names or ()) else (rows,):
         place["x"], place["y"], turn = moves.moved(rows["submap"], place["x"], place["y"])
@@ -139,11 +118,7 @@ def newest_readings(bins: Structured) -> Structured:
     """Return the newest readings of bearings that lie evenly round, then the newest of each one: (≤ 48,) `Reading`.
 
     Before them come the silences that are the newest of their bearing: they show that the object has left.
-
-    Parameters
-    ----------
-    bins : (n,) record of `CircleBin` or `PolygonBin`
-        The bins.
+    `bins`, shape (n,): the bins.
     """
     counts, capacity = bins["count"], bins["readings"].shape[1]
     rank = np.arange(capacity)[:, None]
@@ -167,12 +142,7 @@ def newest_readings(bins: Structured) -> Structured:
 def bearing_bins(places: Floats, count: int) -> NDArray[np.int64]:
     """Return the bearing bins of places about the centre, as `reservoir.keep_reading` computes them; shape (n,).
 
-    Parameters
-    ----------
-    places : (n, ≥ 2) float
-        x and y about the centre, m.
-    count : int
-        Number of bins of the full circle.
+    `places`, shape (n, ≥ 2): x and y about the centre, m. `count`: number of bins of the full circle.
     """
     turns = np.arctan2(places[:, 1], places[:, 0]) / (2.0 * math.pi) + 0.5
     return (turns * count).astype(np.int64) % count

@@ -48,12 +48,7 @@ WALL_MIN_M: Final = 0.5
 def line_chi2(wall: Wall, first: int, end: int) -> tuple[float, int]:
     """Return χ² of the best line through some spans of a wall, each bin's bounded, and the number of bins.
 
-    Parameters
-    ----------
-    wall : Wall
-        The wall.
-    first, end : int
-        The spans, end excluded.
+    `first`, `end`: the spans, end excluded.
     """
     middle = 0.5 * (wall.spans[first].low + wall.spans[end - 1].high)
     n = 0
@@ -156,12 +151,7 @@ def circle_chi2(wall: Wall, first: int, end: int, radius: float, p: SettingsReco
 def flatness(wall: Wall, first: int, end: int, p: SettingsRecord) -> tuple[float, float]:
     """Return the evidence for a line against a circle in the best place, and how well the line fits.
 
-    Parameters
-    ----------
-    wall, p
-        The wall and the settings.
-    first, end : int
-        The spans compared, end excluded.
+    `first`, `end`: the spans compared, end excluded.
 
     Returns
     -------

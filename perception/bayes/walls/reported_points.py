@@ -66,15 +66,8 @@ def reach_corners(walls: dict[int, Straight], corners: Structured, are_mirrors: 
 
     A corner that is heard is reached from afar; one that is not, only if both walls end near it. Between mirrors only
     an inside corner answers from afar, and elsewhere only an edge: that one is sure whatever is known of its walls.
-
-    Parameters
-    ----------
-    walls : dict of Straight
-        The walls by their number; their ends are updated.
-    corners : (n,) record of `RoomCorner`
-        All corners.
-    are_mirrors : bool
-        Whether the walls are known to be mirrors.
+    `walls`: the walls by their number; their ends are updated. `corners`, shape (n,): all corners. `are_mirrors`:
+    whether the walls are known to be mirrors.
 
     Returns
     -------
@@ -117,14 +110,8 @@ def _ends_at(owner: Straight, edge: Structured, echoes: float) -> bool:
 def end_at_edges(walls: dict[int, Straight], edges: Structured, are_mirrors: bool) -> list[tuple[float, ...]]:
     """Move the ends of walls to the edges that are heard there.
 
-    Parameters
-    ----------
-    walls : dict of Straight
-        The walls by their number; their ends are updated.
-    edges : (n,) record of `RoomCorner`
-        All edges.
-    are_mirrors : bool
-        Whether the walls are known to be mirrors; an edge is heard from near then.
+    `walls`: the walls by their number; their ends are updated. `edges`, shape (n,): all edges. `are_mirrors`: whether
+    the walls are known to be mirrors; an edge is heard from near then.
 
     Returns
     -------

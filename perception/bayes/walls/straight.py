@@ -124,12 +124,8 @@ def reported_line(wall: Structured) -> tuple[float, ...]:
 def straighten(walls: dict[int, Straight], corners: Structured, edges: Structured) -> tuple[Structured, Structured]:
     """Fit the walls and the corners that are heard together.
 
-    Parameters
-    ----------
-    walls : dict of Straight
-        The walls by their number; their lines are updated.
-    corners, edges : (n,) record of `RoomCorner`
-        All corners and edges.
+    `walls`: the walls by their number; their lines are updated. `corners`, `edges`, shape (n,): all corners and
+    edges.
 
     Returns
     -------

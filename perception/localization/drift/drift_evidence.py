@@ -139,10 +139,7 @@ def compare_firing(
 class DriftEvidence:
     """The filter that takes odometry as exact, and what the readings say against it.
 
-    Parameters
-    ----------
-    ring : RingConfig
-        The sensors.
+    `ring`: the sensors.
 
     Attributes
     ----------
@@ -164,12 +161,7 @@ class DriftEvidence:
     def enter(self, row: Floats, drifting: LandmarkTracker) -> None:
         """Enter a firing into both filters, and compare what they predict.
 
-        Parameters
-        ----------
-        row : (POSE + sensors,) float
-            As `LandmarkTracker` takes it.
-        drifting : LandmarkTracker
-            The filter with drift.
+        `row`, shape (POSE + sensors,): as `LandmarkTracker` takes it. `drifting`: the filter with drift.
         """
         drifting.move(row)
         if self.is_refuted:

@@ -97,14 +97,8 @@ class _Branch(NamedTuple):
 def find_displacement(echoes: Sequence[Echo], discs: Sequence[Disc], half_angle: float) -> Displacement | None:
     """Return the displacement by which most echoes fit landmarks jointly; None if none fits enough, or two differ.
 
-    Parameters
-    ----------
-    echoes : sequence of Echo
-        Of one cycle of the ring; the nearest `PAIRED_ECHOES_MAX` are used.
-    discs : sequence of Disc
-        The landmarks.
-    half_angle : float
-        Half the beam's width, rad.
+    `echoes`: of one cycle of the ring; the nearest `PAIRED_ECHOES_MAX` are used. `discs`: the landmarks.
+    `half_angle`: half the beam's width, rad.
     """
     nearest = _nearest(echoes)
     least = max(PAIRS_MIN, math.ceil(PAIRED_SHARE * len(nearest)))
@@ -139,13 +133,7 @@ def share_improved(found: Displacement, echoes: Sequence[Echo], discs: Sequence[
 
     After a slip that is most of them; where only some landmarks have moved, a displacement may fit these a little
     better, and the others no better.
-
-    Parameters
-    ----------
-    found : Displacement
-        Of these echoes and landmarks.
-    echoes, discs, half_angle
-        As for `find_displacement`.
+    `found`: of these echoes and landmarks. `echoes`, `discs`, `half_angle`: as for `find_displacement`.
 
     Returns
     -------

@@ -74,13 +74,8 @@ class LandmarkTracker:
 
     A firing is a row of numbers: the pose of the base by odometry (m, rad), the ring's direction (rad), and the range
     of each sensor (m).
-
-    Parameters
-    ----------
-    ring : RingConfig
-        The sensors.
-    is_exact : bool
-        Whether odometry is taken as exact: only landmarks and the ranges' scale are found then.
+    `ring`: the sensors. `is_exact`: whether odometry is taken as exact: only landmarks and the ranges' scale are
+    found then.
 
     Attributes
     ----------
@@ -204,12 +199,8 @@ class LandmarkTracker:
     def displace(self, by: Pose, covariance: Floats) -> None:
         """Move the ring without odometry.
 
-        Parameters
-        ----------
-        by : Pose
-            Its true pose as seen from the believed one.
-        covariance : (3, 3) float
-            Of that: x, y (m) and turn (rad).
+        `by`: its true pose as seen from the believed one. `covariance`, shape (3, 3): of that: x, y (m) and turn
+        (rad).
         """
         e = self.e[0]
         c, s = math.cos(e.heading), math.sin(e.heading)
@@ -286,10 +277,7 @@ class LandmarkTracker:
 def fit_of_turn(landmarks: Floats) -> Floats:
     """Return the weights of the landmarks' errors in the best turn of them all against the ring.
 
-    Parameters
-    ----------
-    landmarks : (count, 2) float
-        Their places, m.
+    `landmarks`, shape (count, 2): their places, m.
 
     Returns
     -------

@@ -23,12 +23,8 @@ LEAST_GAIN: Final = 1e-4
 class WalkRates:
     """The bank.
 
-    Parameters
-    ----------
-    rates : (n,) float
-        Variances per metre, ascending.
-    prior : (n,) float
-        Their probabilities before anything is known.
+    `rates`, shape (n,): variances per metre, ascending. `prior`, shape (n,): their probabilities before anything is
+    known.
 
     Attributes
     ----------
@@ -65,14 +61,8 @@ class WalkRates:
     def enter(self, correction: float, before: float, after: float, way: float) -> None:
         """Enter what the main filter, which assumes `rate`, made of a way.
 
-        Parameters
-        ----------
-        correction : float
-            The sum of its corrections of the value.
-        before, after : float
-            Its variance of the value at the way's begin and end.
-        way : float
-            m.
+        `correction`: the sum of its corrections of the value. `before`, `after`: its variance of the value at the
+        way's begin and end. `way`: m.
         """
         predicted = before + self.rate * way
         self._variances += self._rates * way

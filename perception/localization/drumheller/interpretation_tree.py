@@ -55,12 +55,7 @@ class _Sides(NamedTuple):
 def interpretations(segments: Sequence[ContourSegment], room: Room) -> tuple[Interpretation, ...]:
     """Return the poses that the leaves of the tree give: most assigned segments first.
 
-    Parameters
-    ----------
-    segments : sequence of ContourSegment
-        Those that enter the tree; each is a level.
-    room : Room
-        The walls.
+    `segments`: those that enter the tree; each is a level. `room`: the walls.
     """
     sides = _sides(room)
     allowed = _binary_masks(segments, sides)
@@ -134,12 +129,7 @@ def _pose(chosen: Sequence[tuple[ContourSegment, int]], sides: _Sides) -> Interp
 def poses_along_walls(segments: Sequence[ContourSegment], room: Room) -> Floats:
     """Return poses from which one segment is on one wall: what remains where the tree finds no two walls.
 
-    Parameters
-    ----------
-    segments : sequence of ContourSegment
-        Each is put on each side of each wall that is long enough.
-    room : Room
-        The walls.
+    `segments`: each is put on each side of each wall that is long enough. `room`: the walls.
 
     Returns
     -------

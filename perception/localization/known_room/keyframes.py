@@ -28,10 +28,7 @@ KEYFRAMES_MAX: Final = 128
 class Keyframes:
     """The last keyframes of a run, each under its number modulo `KEYFRAMES_MAX`.
 
-    Parameters
-    ----------
-    mounts : (n, 3) float
-        Place (m) and direction (rad) of each sensor in the ring's frame.
+    `mounts`, shape (n, 3): place (m) and direction (rad) of each sensor in the ring's frame.
 
     Attributes
     ----------
@@ -138,12 +135,8 @@ class Keyframes:
     def compounded(self, first: int, most: int) -> Floats:
         """Return readings of all keyframes from one on, in the frame of that one.
 
-        Parameters
-        ----------
-        first : int
-            Number of that keyframe, which must still be kept.
-        most : int
-            So many readings are chosen at most, evenly.
+        `first`: number of that keyframe, which must still be kept. `most`: so many readings are chosen at most,
+        evenly.
 
         Returns
         -------

@@ -202,14 +202,8 @@ def offer_peaks(
 class PoseGrid:
     """The table of one room, and a search in it.
 
-    Parameters
-    ----------
-    room : Room
-        The surfaces.
-    surroundings : Surroundings
-        Of this room.
-    clear_m : float
-        The ring's centre is farther than this from any surface, m.
+    `room`: the surfaces. `surroundings`: of this room. `clear_m`: the ring's centre is farther than this from any
+    surface, m.
 
     Attributes
     ----------
@@ -315,10 +309,7 @@ class PoseGrid:
     def best_starts(self, most: int) -> Floats:
         """Return the poses that fit best, the best first, without those that fit much worse.
 
-        Parameters
-        ----------
-        most : int
-            So many at most.
+        `most`: so many at most.
 
         Returns
         -------

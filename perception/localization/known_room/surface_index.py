@@ -31,12 +31,7 @@ class Bins(Record):
 def make_index(room: Room, window_m: float) -> tuple[Structured, Ints, Ints]:
     """Return the index of a room's surfaces.
 
-    Parameters
-    ----------
-    room : Room
-        The surfaces.
-    window_m : float
-        Greatest range of a sensor, m.
+    `room`: the surfaces. `window_m`: greatest range of a sensor, m.
 
     Returns
     -------

@@ -106,14 +106,7 @@ class Surroundings(NamedTuple):
 def make_surroundings(room: Room, model: RangeModel, half_angle: float) -> Surroundings:
     """Return the surfaces of a room as kernels take them, with nothing near yet.
 
-    Parameters
-    ----------
-    room : Room
-        The surfaces.
-    model : RangeModel
-        Errors of a range.
-    half_angle : float
-        Half the beam's opening, rad.
+    `room`: the surfaces. `model`: errors of a range. `half_angle`: half the beam's opening, rad.
     """
     walls, corners = zeros(Wall, len(room.walls)), zeros(Corner, len(room.corners))
     circles = zeros(Circle, len(room.circles))
@@ -164,14 +157,7 @@ def insert_nearest(indices: Ints, distances: Floats, count: int, index: int, dis
 def look_around(s: Surroundings, x: float, y: float, within_m: float) -> None:
     """Find the surfaces that sensors near a place can hear.
 
-    Parameters
-    ----------
-    s : Surroundings
-        Its `near` is updated.
-    x, y : float
-        The place, m.
-    within_m : float
-        Greatest distance of a sensor from it, m.
+    `s`: its `near` is updated. `x`, `y`: the place, m. `within_m`: greatest distance of a sensor from it, m.
     """
     near, reach = s.near[0], within_m + s.sensor[0].window_m
     near.x, near.y = x, y
@@ -211,12 +197,7 @@ def look_around(s: Surroundings, x: float, y: float, within_m: float) -> None:
 def way_into(circle_x: float, circle_y: float, radius: float, ux: float, uy: float) -> float:
     """Return how far a ray along a unit vector runs until it enters a circle, m; inf if never.
 
-    Parameters
-    ----------
-    circle_x, circle_y, radius : float
-        The circle, relative to the ray's begin, m.
-    ux, uy : float
-        The vector.
+    `circle_x`, `circle_y`, `radius`: the circle, relative to the ray's begin, m. `ux`, `uy`: the vector.
     """
     off = circle_x * uy - circle_y * ux
     if abs(off) >= radius:
@@ -256,12 +237,7 @@ def is_surface_hidden(s: Surroundings, x: float, y: float, dx: float, dy: float)
 def expect_cone(s: Surroundings, x: float, y: float, cos: float, sin: float) -> tuple[float, float, float]:
     """Return the distance (m) of the nearest point in a beam, and its derivative by the sensor's x and y.
 
-    Parameters
-    ----------
-    s : Surroundings
-        Of a place near the sensor.
-    x, y, cos, sin : float
-        The sensor's place, m, and axis.
+    `s`: of a place near the sensor. `x`, `y`, `cos`, `sin`: the sensor's place, m, and axis.
 
     Returns
     -------

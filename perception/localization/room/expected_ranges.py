@@ -73,14 +73,8 @@ def expected_ranges(room: Room, beams: Beams, half_angle: float, reflection: Ref
 def crossed(room: Room, x: Floats, y: Floats, to_x: Floats, to_y: Floats, slack: float) -> NDArray[np.bool_]:
     """Return which lines of sight cross a surface.
 
-    Parameters
-    ----------
-    room : Room
-        The surfaces.
-    x, y, to_x, to_y : (n,) float
-        Beginning and end of each line, m.
-    slack : float
-        A surface crossed nearer than this to the end does not count, m.
+    `room`: the surfaces. `x`, `y`, `to_x`, `to_y`, shape (n,): beginning and end of each line, m. `slack`: a surface
+    crossed nearer than this to the end does not count, m.
     """
     dx, dy = to_x - x, to_y - y
     length = np.hypot(dx, dy)
@@ -194,12 +188,7 @@ def _nearer(one: Expected, other: Expected) -> Expected:
 def mirror_points(room: Room, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the points that reflect sound back to some places, whatever hides them.
 
-    Parameters
-    ----------
-    room : Room
-        The surfaces.
-    x, y : (n,) float
-        Places, m.
+    `room`: the surfaces. `x`, `y`, shape (n,): places, m.
 
     Returns
     -------

@@ -61,12 +61,8 @@ class Room:
 def make_room(walls: Floats, circles: Floats | None = None) -> Room:
     """Return the room with these walls and round objects.
 
-    Parameters
-    ----------
-    walls : (w, 4) float
-        Both ends of each wall, m. Walls that cross should be split at the crossing; otherwise it is no corner.
-    circles : (k, 3) float, optional
-        Centre and radius of each round object, m.
+    `walls`, shape (w, 4): both ends of each wall, m. Walls that cross should be split at the crossing; otherwise it
+    is no corner. `circles`, shape (k, 3): centre and radius of each round object, m.
 
     Raises
     ------

@@ -78,10 +78,7 @@ class FoundLag(NamedTuple):
 class EchoLag:
     """Enters firings at the poses from which they were heard.
 
-    Parameters
-    ----------
-    ring : RingConfig
-        The sensors, and the lag with which to begin.
+    `ring`: the sensors, and the lag with which to begin.
 
     Attributes
     ----------

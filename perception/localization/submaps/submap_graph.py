@@ -73,10 +73,7 @@ GRIDS_MAX: Final = 250
 class SubmapGraph:
     """The pose by maps of a few metres of way.
 
-    Parameters
-    ----------
-    ring : RingConfig
-        The sensors.
+    `ring`: the sensors.
 
     Attributes
     ----------
@@ -356,12 +353,8 @@ def _is_apart(moved: Floats) -> bool:
 def walk(moved: Floats, way: float, turn: float) -> Floats:
     """Return the covariance of a motion by odometry beside its scales, shape (3, 3).
 
-    Parameters
-    ----------
-    moved : (3,) float
-        x, y (m) and direction (rad) of its end in the frame of its begin.
-    way, turn : float
-        Length (m) and turns (rad) of it. The heading walks evenly along it.
+    `moved`, shape (3,): x, y (m) and direction (rad) of its end in the frame of its begin. `way`, `turn`: length (m)
+    and turns (rad) of it. The heading walks evenly along it.
     """
     place = WALK_M**2 * way + LEAST_VARIANCE
     heading = WALK_RAD**2 * (way + TURN_WAY * turn) + LEAST_VARIANCE

@@ -46,10 +46,7 @@ class Submap(Record):
 class Rows:
     """Records whose number grows with the way.
 
-    Parameters
-    ----------
-    record : type of Record
-        Their kind.
+    `record`: their kind.
     """
 
     SCRATCH: Final = ("_store",)

@@ -278,12 +278,7 @@ def enter_readings(
 class DirectedGrid:
     """The grid's memory.
 
-    Parameters
-    ----------
-    window : Window
-        Where its cells are.
-    ring : Ring
-        The sensors.
+    `window`: where its cells are. `ring`: the sensors.
     """
 
     SCRATCH: Final = (

@@ -100,12 +100,7 @@ def enter_reading(
 class MoravecElfesGrid:
     """The grid's memory.
 
-    Parameters
-    ----------
-    window : Window
-        Where its cells are.
-    ring : Ring
-        The sensors.
+    `window`: where its cells are. `ring`: the sensors.
     """
 
     mirrors: Final = 1.0

@@ -266,12 +266,7 @@ def fill_crossed(sights: NDArray[np.int16], corner: Ints, places: int, units: fl
 class SightLines:
     """The cells that lines of sight have crossed.
 
-    Parameters
-    ----------
-    window : Window
-        Where the cells are.
-    ring : Ring
-        The sensors.
+    `window`: where the cells are. `ring`: the sensors.
     """
 
     SCRATCH: Final = ("_window", "_ring", "_blocked_m", "_shares", "_edges")
@@ -329,12 +324,8 @@ class SightLines:
     def crossed(self, mirrors: float, trust: float | None = None) -> Flags:
         """Return which cells a line of sight has crossed: (n, n), row by row from the smallest y.
 
-        Parameters
-        ----------
-        mirrors : float
-            How far this is a place of mirrors, 0 to 1, as is known by now.
-        trust : float, optional
-            In place of what is learnt from these lines.
+        `mirrors`: how far this is a place of mirrors, 0 to 1, as is known by now. `trust`: in place of what is learnt
+        from these lines.
         """
         trust = self.trust if trust is None else trust
         least = PLACES_MIN if mirrors < MIRRORS_MIN else COUNT_MAX + 1

@@ -100,12 +100,7 @@ class Snapshot:
 class Picture:
     """Draws snapshots for a terminal.
 
-    Parameters
-    ----------
-    console : Console
-        The terminal.
-    scale : Scale
-        Of the run.
+    `console`: the terminal. `scale`: of the run.
     """
 
     def __init__(self, console: Console, scale: Scale) -> None:

@@ -58,14 +58,7 @@ def after_each_cycle(call: OnCycle) -> OnCycle:
 class View:
     """Shows the run on a terminal.
 
-    Parameters
-    ----------
-    settings : Settings
-        Of the run.
-    console : Console
-        The terminal.
-    units : {"m", "ft"}
-        Units of the table of objects.
+    `settings`: of the run. `console`: the terminal. `units`: units of the table of objects.
     """
 
     def __init__(self, settings: Settings, console: Console, units: Units) -> None:
@@ -100,14 +93,7 @@ class View:
     def on_cycle(self, record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
         """Store what the view shows next.
 
-        Parameters
-        ----------
-        record, state : CycleRecord, State
-            Of the cycle.
-        stats : CycleStats
-            Of the run.
-        driver : RobotDriver
-            For the counts of the link.
+        `stats`: of the run. `driver`: for the counts of the link.
         """
         for firing in record.inputs.received.firings:
             fired = ~np.isnan(firing.ranges_m)
