@@ -37,27 +37,18 @@ free way of wander."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Zone:
-    """A no-go line or area, or an area with a speed limit.
-
-    Attributes
-    ----------
-    what : str
-        For the operator.
-    ends : (n, 4) float
-        Its sides x1, y1, x2, y2, m.
-    is_area : bool
-        Whether its inside belongs to it.
-    speed_max_m_s : float
-        0 for a no-go line or area.
-    box : tuple of float
-        Least and greatest x, least and greatest y, m.
-    """
+    """A no-go line or area, or an area with a speed limit."""
 
     what: str
+    """For the operator."""
     ends: Floats
+    """(n, 4): its sides x1, y1, x2, y2, m."""
     is_area: bool
+    """Whether its inside belongs to it."""
     speed_max_m_s: float
+    """0 for a no-go line or area."""
     box: tuple[float, float, float, float]
+    """Least and greatest x, least and greatest y, m."""
 
     def distances_m(self, points: Floats) -> Floats:
         """Return the distance of points (shape (…, 2), m) to it, shape (…): negative inside an area."""

@@ -130,13 +130,7 @@ RecordedFlags: TypeAlias = Annotated[Flags, Field(ge=0, le=COUNT_MAX)]
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """A robot's description of itself; a new `boot_id` means that it has restarted.
-
-    Attributes
-    ----------
-    traits
-        What else it says of itself that outlasts a restart: names and values.
-    """
+    """A robot's description of itself; a new `boot_id` means that it has restarted."""
 
     name: str
     sensors: int
@@ -145,53 +139,38 @@ class Identity:
     odometry_period_s: float
     boot_id: int
     traits: tuple[tuple[str, str], ...] = ()
+    """What else it says of itself that outlasts a restart: names and values."""
 
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """The base's pose and velocity by its own odometry.
-
-    Attributes
-    ----------
-    robot_s
-        The robot's own clock: seconds since boot, unwrapped.
-    pose
-        Position, and the direction in which the wheels drive; unwrapped.
-    ring_yaw
-        Direction of the ring's sensor 0, rad, unwrapped. It equals `pose.theta` on a base whose body turns with its
-        wheels, not on a synchro drive.
-    twist
-        The wheels' velocity.
-    flags
-        The base's status.
-    last_drive_seq
-        Number of the last drive command that the base obeyed.
-    """
+    """The base's pose and velocity by its own odometry."""
 
     robot_s: Seconds
+    """The robot's own clock: seconds since boot, unwrapped."""
     pose: Pose
+    """Position, and the direction in which the wheels drive; unwrapped."""
     ring_yaw: Coordinate
+    """Direction of the ring's sensor 0, rad, unwrapped. It equals `pose.theta` on a base whose body turns with its
+    wheels, not on a synchro drive."""
     twist: Twist
+    """The wheels' velocity."""
     flags: RecordedFlags
+    """The base's status."""
     last_drive_seq: Number
+    """Number of the last drive command that the base obeyed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CrossPaths:
-    """What the sensors that listened without firing heard of the others' pulses: one entry for each, shape (n,).
-
-    Attributes
-    ----------
-    transmitters, listeners
-        Indices of the sensor whose pulse was heard, and of the one that listened.
-    half_paths_m
-        Half the whole path from the transmitter over a surface to the listener, m; +inf if nothing was heard inside
-        the window.
-    """
+    """What the sensors that listened without firing heard of the others' pulses: one entry for each, shape (n,)."""
 
     transmitters: Indices
     listeners: Indices
+    """Indices of the sensor whose pulse was heard, and of the one that listened."""
     half_paths_m: Ranges
+    """Half the whole path from the transmitter over a surface to the listener, m; +inf if nothing was heard inside
+    the window."""
 
     def contradiction(self, sensors: int) -> str | None:
         """Return why a ring of so many sensors cannot have heard this; None if it can."""
@@ -206,27 +185,19 @@ class CrossPaths:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Firing:
-    """One firing of a set of sensors, and the pose of the base when they fired.
-
-    Attributes
-    ----------
-    robot_s
-        The robot's own clock when the sensors fired, s.
-    pose, ring_yaw
-        As in `Odometry`, at that time.
-    ranges_m
-        Shape (sensors,), one entry for each sensor of the ring: the range in metres, +inf for a sensor that fired and
-        heard no echo inside its window, NaN for one that did not fire or reported a fault.
-    cross_paths
-        What the listeners heard, in the order of their indices, without those that reported a fault; None if there
-        is none, as always on a ring that cannot listen.
-    """
+    """One firing of a set of sensors, and the pose of the base when they fired."""
 
     robot_s: Seconds
+    """The robot's own clock when the sensors fired, s."""
     pose: Pose
     ring_yaw: Coordinate
+    """As in `Odometry`, at that time."""
     ranges_m: Ranges
+    """Shape (sensors,), one entry for each sensor of the ring: the range in metres, +inf for a sensor that fired and
+    heard no echo inside its window, NaN for one that did not fire or reported a fault."""
     cross_paths: CrossPaths | None = None
+    """What the listeners heard, in the order of their indices, without those that reported a fault; None if there is
+    none, as always on a ring that cannot listen."""
 
     def contradiction(self) -> str | None:
         """Return why the cross paths are not of this ring; None if they are."""

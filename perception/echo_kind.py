@@ -38,31 +38,22 @@ _DELTA: Final = 1e-5
 
 
 class EchoKind(NamedTuple):
-    """A surface as one stand hears it.
-
-    Attributes
-    ----------
-    bearing, range_m
-        Direction and distance of its nearest point from the ring's centre in the ring's frame, rad and m, of the most
-        probable kind; a corner's are those of its vertex.
-    sigma_bearing, sigma_range_m
-        Their standard deviations under that kind.
-    probabilities
-        Of `KINDS`, in their order.
-    radius_m
-        A cylinder's expected radius, m.
-    misfit
-        Mean square of the residuals under the best kind, in their variance: about 1 if it is one surface of a kind
-        known here.
-    """
+    """A surface as one stand hears it."""
 
     bearing: float
     range_m: float
+    """Direction and distance of its nearest point from the ring's centre in the ring's frame, rad and m, of the most
+    probable kind; a corner's are those of its vertex."""
     sigma_bearing: float
     sigma_range_m: float
+    """Their standard deviations under that kind."""
     probabilities: tuple[float, float, float, float]
+    """Of `KINDS`, in their order."""
     radius_m: float
+    """A cylinder's expected radius, m."""
     misfit: float
+    """Mean square of the residuals under the best kind, in their variance: about 1 if it is one surface of a kind
+    known here."""
 
     @property
     def kind(self) -> Kind | Literal["convex", "unknown"]:

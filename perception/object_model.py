@@ -14,27 +14,19 @@ from perception.shared_numbers import ROUNDING
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectModel:
-    """The outline of an object in its own frame.
-
-    Attributes
-    ----------
-    name : str
-        The model's name.
-    sides : (m, 4) float
-        Middle x, y (m), direction (rad) and length (m) of each side.
-    centroid : (float, float)
-        Mean of the outline, weighted by length, m.
-    facing : float or None
-        The direction in which an open outline bulges, rad. None for a closed outline: it gives no first guess.
-    lever_m : float or None
-        Root mean square distance of the outline from its mean, m: what a heading is measured by. None if it is round.
-    """
+    """The outline of an object in its own frame."""
 
     name: str
+    """The model's name."""
     sides: Floats
+    """(m, 4): middle x, y (m), direction (rad) and length (m) of each side."""
     centroid: tuple[float, float]
+    """Mean of the outline, weighted by length, m."""
     facing: float | None
+    """The direction in which an open outline bulges, rad. None for a closed outline: it gives no first guess."""
     lever_m: float | None = None
+    """Root mean square distance of the outline from its mean, m: what a heading is measured by. None if it is
+    round."""
 
     @classmethod
     def from_config(cls, config: ModelConfig) -> ObjectModel:

@@ -37,22 +37,15 @@ ALL_FREE: Final = bytes(SECTORS)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cells:
-    """What may stand in the way near a place.
-
-    Attributes
-    ----------
-    dx, dy : (k,) float
-        From the place to each occupied cell or fresh echo, m.
-    distances : (k,) float
-        Their lengths, m.
-    certainties : (k,) float
-        Above 0, and 1 for a sure cell and for an echo.
-    """
+    """What may stand in the way near a place."""
 
     dx: Floats
     dy: Floats
+    """(k,): from the place to each occupied cell or fresh echo, m."""
     distances: Floats
+    """(k,): their lengths, m."""
     certainties: Floats
+    """(k,): above 0, and 1 for a sure cell and for an echo."""
 
 
 def cells_near(

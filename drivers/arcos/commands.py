@@ -94,18 +94,12 @@ class Raw:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command to the robot.
-
-    Attributes
-    ----------
-    number
-        Its number, one of `CommandNumber` or unknown.
-    argument
-        None, an integer of -65535 to 65535, a byte string, or the bytes of any other form.
-    """
+    """A command to the robot."""
 
     number: int
+    """Its number, one of `CommandNumber` or unknown."""
     argument: int | bytes | Raw | None = None
+    """None, an integer of -65535 to 65535, a byte string, or the bytes of any other form."""
 
     @property
     def value(self) -> int:

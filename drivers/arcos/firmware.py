@@ -9,62 +9,44 @@ from drivers.arcos.frames import BAUDS, ConfigPacket
 
 @dataclass(frozen=True, slots=True)
 class Firmware:
-    """One robot's names, factors and flash settings.
-
-    Attributes
-    ----------
-    subclass
-        The model, in lower case, by which clients find their parameters.
-    mm_per_count
-        Odometry, mm of a raw unit.
-    mm_s_per_count
-        Speed of a wheel, mm/s of a raw unit.
-    mm_per_range
-        Range, mm of a raw unit.
-    rad_s_per_mm_s
-        Turning rate, rad/s, of half the difference of the wheels' speeds, mm/s.
-    sensor_numbers
-        Number of each sensor of the ring in SIPs and POLLING, counted from 0.
-    vel2_mm_s
-        Speed of a unit of VEL2, mm/s.
-    front_bumpers, rear_bumpers
-        Number of their segments.
-    speed_top_mm_s, turn_top_deg_s
-        Absolute limits, mm/s and degrees/s.
-    baud
-        Speed of the line after a reset and after CLOSE.
-    name, class_name, serial
-        As in the answer to SYNC2 and in the CONFIGpac.
-    sip_cycle_ms, sonar_cycle_ms, watchdog_ms
-        Periods, ms.
-    acceleration_mm_s2, turn_acceleration_deg_s2
-        Ramps until SETA and SETRA change them, up and down alike.
-    acceleration_top_mm_s2, turn_acceleration_top_deg_s2
-        Their limits; ESTOP brakes with them.
-    """
+    """One robot's names, factors and flash settings."""
 
     subclass: str
+    """The model, in lower case, by which clients find their parameters."""
     mm_per_count: float
+    """Odometry, mm of a raw unit."""
     mm_s_per_count: float
+    """Speed of a wheel, mm/s of a raw unit."""
     mm_per_range: float
+    """Range, mm of a raw unit."""
     rad_s_per_mm_s: float
+    """Turning rate, rad/s, of half the difference of the wheels' speeds, mm/s."""
     sensor_numbers: tuple[int, ...]
+    """Number of each sensor of the ring in SIPs and POLLING, counted from 0."""
     vel2_mm_s: int = 20
+    """Speed of a unit of VEL2, mm/s."""
     front_bumpers: int = 5
     rear_bumpers: int = 5
+    """Number of their segments."""
     speed_top_mm_s: int = 2200
     turn_top_deg_s: int = 500
+    """Absolute limits, mm/s and degrees/s."""
     baud: int = 9600
+    """Speed of the line after a reset and after CLOSE."""
     name: str = "echolocate"
     class_name: str = "Pioneer"
     serial: str = "EMULATED"
+    """As in the answer to SYNC2 and in the CONFIGpac."""
     sip_cycle_ms: int = 100
     sonar_cycle_ms: int = 40
     watchdog_ms: int = 2000
+    """Periods, ms."""
     acceleration_mm_s2: int = 300
     turn_acceleration_deg_s2: int = 100
+    """Ramps until SETA and SETRA change them, up and down alike."""
     acceleration_top_mm_s2: int = 4000
     turn_acceleration_top_deg_s2: int = 600
+    """Their limits; ESTOP brakes with them."""
 
     def config_packet(self, speed_mm_s: int, turn_deg_s: int, watchdog_ms: int, ramps: RampSettings) -> ConfigPacket:
         """Return the CONFIGpac."""

@@ -65,76 +65,56 @@ class Sip:
     """The server information packet, which the robot sends periodically: odometry, status and new ranges.
 
     The factors between raw values and SI differ between models.
-
-    Attributes
-    ----------
-    kind
-        Packet type: at rest 0x32, in motion 0x33.
-    x, y
-        Raw odometry, signed 16 bits as sent; firmware counts 15 of them.
-    heading
-        In units of 1/4096 turn, counter-clockwise.
-    left, right
-        Raw speeds of the wheels.
-    battery
-        0.1 V.
-    stall_left, stall_right
-        Bit 0: the wheel is stalled. Bits 1 to 7: segments 1 to 7 of the rear bumper (left) or front bumper (right).
-    control
-        Set-point of the heading.
-    flags
-        Bits of `SipFlags`.
-    compass
-        2 degrees; 0 without a compass.
-    sonar
-        Ranges measured since the last SIP, in the order of firing.
-    missing
-        Number of ranges that the packet announces and does not hold; then `sonar` is empty.
-    gripper, analog_port, analog, digital_in, digital_out
-        Accessories, one byte each. P2OS ends here; each field from here on may be None, and then so are all after it.
-    battery_10
-        0.1 V, two bytes.
-    charge
-        Charger: 0 not charging, 1 bulk, 2 overcharge, 3 float, 4 balance.
-    turn_10
-        Turning rate, 0.1 degrees/s.
-    fault_flags, lateral, temperature, charge_percent
-        Fault bits; lateral speed, mm/s; °C, -127 or -128 without a sensor; %.
-    controller_us, flags_3
-        Only of some models: the controller's clock and more status bits.
-    extra
-        Bytes after the last field.
     """
 
     kind: int
+    """Packet type: at rest 0x32, in motion 0x33."""
     x: int
     y: int
+    """Raw odometry, signed 16 bits as sent; firmware counts 15 of them."""
     heading: int
+    """In units of 1/4096 turn, counter-clockwise."""
     left: int
     right: int
+    """Raw speeds of the wheels."""
     battery: int
+    """0.1 V."""
     stall_left: int
     stall_right: int
+    """Bit 0: the wheel is stalled. Bits 1 to 7: segments 1 to 7 of the rear bumper (left) or front bumper (right)."""
     control: int
+    """Set-point of the heading."""
     flags: int
+    """Bits of `SipFlags`."""
     compass: int
+    """2 degrees; 0 without a compass."""
     sonar: tuple[SonarReading, ...] = ()
+    """Ranges measured since the last SIP, in the order of firing."""
     missing: int = 0
+    """Number of ranges that the packet announces and does not hold; then `sonar` is empty."""
     gripper: int | None = None
     analog_port: int | None = None
     analog: int | None = None
     digital_in: int | None = None
     digital_out: int | None = None
+    """Accessories, one byte each. P2OS ends here; each field from here on may be None, and then so are all after
+    it."""
     battery_10: int | None = None
+    """0.1 V, two bytes."""
     charge: int | None = None
+    """Charger: 0 not charging, 1 bulk, 2 overcharge, 3 float, 4 balance."""
     turn_10: int | None = None
+    """Turning rate, 0.1 degrees/s."""
     fault_flags: int | None = None
     lateral: int | None = None
     temperature: int | None = None
     charge_percent: int | None = None
+    """Fault bits; lateral speed, mm/s; °C, -127 or -128 without a sensor; %."""
     controller_us: int | None = None
     flags_3: int | None = None
+    """Only of some models: the controller's clock and more status bits."""
     extra: bytes = b""
+    """Bytes after the last field."""
 
 
 @dataclass(frozen=True, slots=True)

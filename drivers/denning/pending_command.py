@@ -22,28 +22,20 @@ class PendingCommand:
 
     Each try has its own sequence number, because the robot counts gaps in them as losses. An answer to any try
     counts, because all commands are idempotent.
-
-    Attributes
-    ----------
-    build
-        Makes the frame from a sequence number.
-    every_s
-        Time from one try to the next.
-    tries_max
-        Tries before giving up; None = never.
-    due
-        True if it should be sent as soon as possible.
-    tries, sent_s, first_s
-        Number of tries, and the times of the newest and of the first.
     """
 
     build: Callable[[int], HostFrame]
+    """Makes the frame from a sequence number."""
     every_s: float
+    """Time from one try to the next."""
     tries_max: int | None
+    """Tries before giving up; None = never."""
     due: bool = True
+    """True if it should be sent as soon as possible."""
     tries: int = 0
     sent_s: float = 0.0
     first_s: float = 0.0
+    """Number of tries, and the times of the newest and of the first."""
     seqs: deque[int] = field(default_factory=lambda: deque(maxlen=_SEQS_KEPT))
 
     def frame(self, seq: int, run_s: float) -> HostFrame:

@@ -35,52 +35,34 @@ LOOKS_MIN: Final = 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Looks:
-    """Readings of sensors near the bearing of a surface, each an array of shape (m,).
-
-    Attributes
-    ----------
-    sensor : int
-        The sensor.
-    bearing : float
-        Bearing of the surface's nearest point from the sensor's nominal axis, rad.
-    distance : float
-        Distance of that point, m.
-    radius : float
-        Radius of a round object, m; inf for a wall.
-    read : float
-        The reading, m; inf for silence.
-    sigma : float
-        Its standard deviation, m.
-    """
+    """Readings of sensors near the bearing of a surface, each an array of shape (m,)."""
 
     sensor: NDArray[np.intp]
+    """The sensor."""
     bearing: Floats
+    """Bearing of the surface's nearest point from the sensor's nominal axis, rad."""
     distance: Floats
+    """Distance of that point, m."""
     radius: Floats
+    """Radius of a round object, m; inf for a wall."""
     read: Floats
+    """The reading, m; inf for silence."""
     sigma: Floats
+    """Its standard deviation, m."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BeamFit:
-    """Directions and width of the beams.
-
-    Attributes
-    ----------
-    turns : (n,) float
-        What to add to each sensor's nominal direction, rad; 0 where too few looks show it.
-    sigmas : (n,) float
-        Its standard deviation, rad; inf where too few looks show it.
-    half_angle : float
-        Half of the beam's opening, rad.
-    everything_echoes : bool
-        Whether all in the beam answers, not only mirrors.
-    """
+    """Directions and width of the beams."""
 
     turns: Floats
+    """(n,): what to add to each sensor's nominal direction, rad; 0 where too few looks show it."""
     sigmas: Floats
+    """(n,): its standard deviation, rad; inf where too few looks show it."""
     half_angle: float
+    """Half of the beam's opening, rad."""
     everything_echoes: bool
+    """Whether all in the beam answers, not only mirrors."""
 
 
 def fit_beams(looks: Looks, sensors: int) -> BeamFit:

@@ -84,41 +84,29 @@ class Calibration:
     What it does not show has its nominal value, and infinite as its uncertainty. What differs from the nominal value
     by no more than the noise of the drive explains has that value, too, with its own uncertainty. Where the
     halves of the drive differ by more than their noise explains, the uncertainties are greater by as much.
-
-    Attributes
-    ----------
-    mounts : (n, 3) float
-        Place (m) and direction (rad) of each sensor in the ring's frame.
-    place_sigmas_m, angle_sigmas_rad : (n,) float
-        Standard deviations; a direction is shown only of a sensor whose place is.
-    readings : (n,) int
-        Echoes of each sensor that took part.
-    half_angle_rad : float
-        Half of the beam's opening; the nominal one unless the drive shows directions.
-    everything_echoes : bool
-        Whether all in the beam answers, not only mirrors.
-    scales, scale_sigmas : Scales
-        Of odometry and ranges, reported over true.
-    noise : RangeNoise
-        Of the ranges.
-    walls, drums : int
-        Surfaces that were found.
-    has_gain : bool
-        Whether anything has another value than the nominal one.
     """
 
     mounts: Floats
+    """(n, 3): place (m) and direction (rad) of each sensor in the ring's frame."""
     place_sigmas_m: Floats
     angle_sigmas_rad: Floats
+    """(n,): standard deviations; a direction is shown only of a sensor whose place is."""
     readings: NDArray[np.intp]
+    """(n,): echoes of each sensor that took part."""
     half_angle_rad: float
+    """Half of the beam's opening; the nominal one unless the drive shows directions."""
     everything_echoes: bool
+    """Whether all in the beam answers, not only mirrors."""
     scales: Scales
     scale_sigmas: Scales
+    """Of odometry and ranges, reported over true."""
     noise: RangeNoise
+    """Of the ranges."""
     walls: int
     drums: int
+    """Surfaces that were found."""
     has_gain: bool
+    """Whether anything has another value than the nominal one."""
 
     @property
     def shows_any(self) -> bool:

@@ -37,30 +37,20 @@ class Path(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """The firings of a drive, as the robot reported them.
-
-    Attributes
-    ----------
-    poses : (f, 3) float
-        Place (m) and heading (rad, unwrapped) by the odometry.
-    ring_yaw : (f,) float
-        Direction of the ring by the odometry, rad.
-    ranges : (f, n) float
-        Range of each sensor, m; inf for silence, NaN if it did not fire.
-    way_m : (f,) float
-        Way to each firing by the odometry, m.
-    chords_m : (f - 1,) float
-        Distance from each pose to the next, m.
-    sideways : (f - 1,) float
-        Direction of that chord from the heading half-way: 0 forwards, π backwards, rad.
-    """
+    """The firings of a drive, as the robot reported them."""
 
     poses: Floats
+    """(f, 3): place (m) and heading (rad, unwrapped) by the odometry."""
     ring_yaw: Floats
+    """(f,): direction of the ring by the odometry, rad."""
     ranges: Floats
+    """(f, n): range of each sensor, m; inf for silence, NaN if it did not fire."""
     way_m: Floats
+    """(f,): way to each firing by the odometry, m."""
     chords_m: Floats
+    """(f - 1,): distance from each pose to the next, m."""
     sideways: Floats
+    """(f - 1,): direction of that chord from the heading half-way: 0 forwards, π backwards, rad."""
 
     @property
     def knots(self) -> int:

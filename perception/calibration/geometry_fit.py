@@ -52,24 +52,16 @@ class Priors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Geometry:
-    """All that ranges depend on.
-
-    Attributes
-    ----------
-    scales : Scales
-        Of odometry and ranges.
-    surfaces : Surfaces
-        Walls and round objects, in the frame of the drive's first pose.
-    mounts : (n, 2) float
-        Place of each sensor in the ring's frame, m.
-    bends : (knots,) float
-        As for `Drive.path`.
-    """
+    """All that ranges depend on."""
 
     scales: Scales
+    """Of odometry and ranges."""
     surfaces: Surfaces
+    """Walls and round objects, in the frame of the drive's first pose."""
     mounts: Floats
+    """(n, 2): place of each sensor in the ring's frame, m."""
     bends: Floats
+    """(knots,): as for `Drive.path`."""
 
 
 class RangeNoise(NamedTuple):
@@ -88,27 +80,18 @@ class RangeNoise(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeometryFit:
-    """The result of a fit.
-
-    Attributes
-    ----------
-    geometry : Geometry
-        The estimate.
-    scale_sigmas : Scales
-        Standard deviation of each scale.
-    mount_sigmas_m : (n,) float
-        That of each sensor's place, the greater of its two axes, m.
-    readings : (n,) int
-        Readings of each sensor that took part.
-    noise : RangeNoise
-        Of the ranges.
-    """
+    """The result of a fit."""
 
     geometry: Geometry
+    """The estimate."""
     scale_sigmas: Scales
+    """Standard deviation of each scale."""
     mount_sigmas_m: Floats
+    """(n,): that of each sensor's place, the greater of its two axes, m."""
     readings: NDArray[np.intp]
+    """(n,): readings of each sensor that took part."""
     noise: RangeNoise
+    """Of the ranges."""
 
 
 def sensors_at(path: Path, echoes: Echoes, mounts: Floats, angles: Floats) -> Beams:

@@ -45,18 +45,12 @@ class Beams(NamedTuple):
 
 
 class Surfaces(NamedTuple):
-    """Walls as lines, and round objects.
-
-    Attributes
-    ----------
-    walls : (w, 2) float
-        Direction (rad) of each normal, away from the robot, and normal · point (m).
-    drums : (k, 3) float
-        Centre and radius of each round object, m.
-    """
+    """Walls as lines, and round objects."""
 
     walls: Floats
+    """(w, 2): direction (rad) of each normal, away from the robot, and normal · point (m)."""
     drums: Floats
+    """(k, 3): centre and radius of each round object, m."""
 
     def distances(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Return distance (m) and bearing (rad) of the answering point of each surface, shape (w + k, m) each."""

@@ -36,21 +36,14 @@ class RecordingError(UserError):
 
 @dataclass
 class Recording:
-    """An open recording.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    info : RunInfo
-        Description of the run.
-    settings : Settings
-        The run's settings at the start of the file.
-    """
+    """An open recording."""
 
     path: Path
+    """The file."""
     info: RunInfo
+    """Description of the run."""
     settings: Settings
+    """The run's settings at the start of the file."""
     _data: memoryview
     _scanner: McapScanner = field(init=False)
 

@@ -33,37 +33,26 @@ DEEP_M: Final = 1.5
 
 @dataclass(frozen=True, slots=True)
 class CanyonOutcome:
-    """The end of one drive (m, s).
-
-    Attributes
-    ----------
-    depth_m, width_m : float
-        Of the canyon.
-    arrived : bool
-        Whether the robot stood at its goal.
-    entries : int
-        How often its centre passed the mouth inwards.
-    deepest_m : float
-        How far it was behind the mouth at most; negative if it never was.
-    contacts : int
-        How often its rim touched a wall.
-    way_m, shortest_m, time_s : float
-        What it drove, the shortest way, and the time it took.
-    reported_m : float or None
-        Where the robot was along the axis when the canyon was first reported, negative before the mouth; None if it
-        never was.
-    """
+    """The end of one drive (m, s)."""
 
     depth_m: float
     width_m: float
+    """Of the canyon."""
     arrived: bool
+    """Whether the robot stood at its goal."""
     entries: int
+    """How often its centre passed the mouth inwards."""
     deepest_m: float
+    """How far it was behind the mouth at most; negative if it never was."""
     contacts: int
+    """How often its rim touched a wall."""
     way_m: float
     shortest_m: float
     time_s: float
+    """What it drove, the shortest way, and the time it took."""
     reported_m: float | None = None
+    """Where the robot was along the axis when the canyon was first reported, negative before the mouth; None if it
+    never was."""
     heard_m: float | None = None
     """How far before the mouth the back is first heard on the straight way; None if it is not."""
 

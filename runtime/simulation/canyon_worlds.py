@@ -35,25 +35,17 @@ Reflection: TypeAlias = Literal["specular", "cone"]
 
 @dataclass(frozen=True, slots=True)
 class CanyonWorld:
-    """A canyon, a start and a goal.
-
-    Attributes
-    ----------
-    world : WorldConfig
-        The walls, and the start.
-    depth_m, width_m : float
-        Of the canyon.
-    mouth : Pose
-        The middle of the mouth, looking in.
-    goal : tuple of float
-        In the world's frame, m.
-    """
+    """A canyon, a start and a goal."""
 
     world: WorldConfig
+    """The walls, and the start."""
     depth_m: float
     width_m: float
+    """Of the canyon."""
     mouth: Pose
+    """The middle of the mouth, looking in."""
     goal: tuple[float, float]
+    """In the world's frame, m."""
 
     @property
     def start(self) -> Pose:

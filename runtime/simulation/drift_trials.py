@@ -59,33 +59,23 @@ LEVELS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class DriftOutcome:
-    """The end of one drive; lengths in metres, angles in rad.
-
-    Attributes
-    ----------
-    errors : tuple of float
-        Errors of the drums found, as seen from the robot.
-    missed, false : int
-        Drums not found; objects that are no drums.
-    place, heading : float
-        Errors of the robot's pose in the map frame.
-    nees : float or None
-        Normalised squared error of that pose, three degrees of freedom; None without correction, as what follows.
-    object_nees : float or None
-        The same of the objects' places in the map frame, two degrees of freedom, the mean over them.
-    odometer_error, range_error : float or None
-        Relative errors of the scales found.
-    """
+    """The end of one drive; lengths in metres, angles in rad."""
 
     errors: tuple[float, ...]
+    """Errors of the drums found, as seen from the robot."""
     missed: int
     false: int
+    """Drums not found; objects that are no drums."""
     place: float
     heading: float
+    """Errors of the robot's pose in the map frame."""
     nees: float | None = None
+    """Normalised squared error of that pose, three degrees of freedom; None without correction, as what follows."""
     object_nees: float | None = None
+    """The same of the objects' places in the map frame, two degrees of freedom, the mean over them."""
     odometer_error: float | None = None
     range_error: float | None = None
+    """Relative errors of the scales found."""
 
 
 class DriftRow(TypedDict):

@@ -25,41 +25,27 @@ PLACE_INFORMATION: Final = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """The lines of walls in their frames.
-
-    Attributes
-    ----------
-    frames : (n, 4) float
-        Origin (m) and normal of each frame.
-    lines : (n, 5) float
-        Offset (m), slope, and their variance (m²), covariance (m) and variance.
-    """
+    """The lines of walls in their frames."""
 
     frames: Floats
+    """(n, 4): origin (m) and normal of each frame."""
     lines: Floats
+    """(n, 5): offset (m), slope, and their variance (m²), covariance (m) and variance."""
 
 
 @dataclass(frozen=True, slots=True)
 class Incidences:
-    """Points that lie on lines, linear about the present: offset + slope · along + row · place = level.
-
-    Attributes
-    ----------
-    points, lines : (n,) int
-        Which point lies on which line.
-    along : (n,) float
-        Position along the line's frame, m.
-    rows : (n, 2) float
-        Factors of the point's place.
-    levels : (n,) float
-        m.
-    """
+    """Points that lie on lines, linear about the present: offset + slope · along + row · place = level."""
 
     points: NDArray[np.int64]
     lines: NDArray[np.int64]
+    """(n,): which point lies on which line."""
     along: Floats
+    """(n,): position along the line's frame, m."""
     rows: Floats
+    """(n, 2): factors of the point's place."""
     levels: Floats
+    """(n,): m."""
 
 
 def fit_together(walls: Lines, corners: Structured, numbers: Sequence[int]) -> Floats:

@@ -24,23 +24,16 @@ LINE: Final = ("offset", "slope", "variance_offset", "covariance", "variance_slo
 
 @dataclass(slots=True)
 class Straight:
-    """The line of a wall that is sure, and its spans.
-
-    Attributes
-    ----------
-    frame : tuple of float
-        Origin (m), normal, offset (m) and slope, as in `Wall`.
-    variances : tuple of float
-        Variance of the offset (m²), covariance (m), and variance of the slope.
-    ends : (n, 2) float
-        The ends of the spans along it in ascending order, m.
-    """
+    """The line of a wall that is sure, and its spans."""
 
     wall: Any
     spans: Structured
     frame: tuple[float, ...]
+    """Origin (m), normal, offset (m) and slope, as in `Wall`."""
     variances: tuple[float, ...]
+    """Variance of the offset (m²), covariance (m), and variance of the slope."""
     ends: Floats
+    """(n, 2): the ends of the spans along it in ascending order, m."""
 
     def point(self, along: float) -> tuple[float, float]:
         """Return the point at a position along the line, m."""

@@ -67,18 +67,12 @@ CANDIDATE_PROBABILITY_MIN: Final = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class PoseCandidate:
-    """A pose that the ring may have.
-
-    Attributes
-    ----------
-    pose : Pose
-        Place (m) and direction of sensor 0 (rad) in the map frame, at the last firing.
-    probability : float
-        Its probability. What the probabilities of all candidates lack of 1 is that of any other place.
-    """
+    """A pose that the ring may have."""
 
     pose: Pose
+    """Place (m) and direction of sensor 0 (rad) in the map frame, at the last firing."""
     probability: float
+    """Its probability. What the probabilities of all candidates lack of 1 is that of any other place."""
 
 
 def localize(

@@ -16,20 +16,14 @@ from perception.sensor_mounts import mounts_at
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Panorama:
-    """One reading of each sensor, in the frame of the ring at the last firing.
-
-    Attributes
-    ----------
-    x, y, axis : (n,) float
-        Place (m) and direction (rad) of each sensor, in the order of the ring.
-    range_m : (n,) float
-        Range, m: inf heard nothing, NaN did not fire.
-    """
+    """One reading of each sensor, in the frame of the ring at the last firing."""
 
     x: Floats
     y: Floats
     axis: Floats
+    """(n,): place (m) and direction (rad) of each sensor, in the order of the ring."""
     range_m: Floats
+    """(n,): range, m: inf heard nothing, NaN did not fire."""
 
 
 def panoramas(firings: Sequence[Firing], ring: RingConfig) -> tuple[Panorama, ...]:

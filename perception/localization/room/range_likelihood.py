@@ -19,28 +19,19 @@ OUTLIERS: Final = 0.1
 
 @dataclass(frozen=True, slots=True)
 class RangeModel:
-    """Errors of a range: rounding and noise, drop-outs, and echoes of what the room does not have.
-
-    Attributes
-    ----------
-    resolution_m : float
-        Step of the reported range, m; 0 = not rounded.
-    window_m : float
-        Greatest range, m.
-    noise_relative : float
-        Standard deviation of the noise as a share of the range.
-    noise_m : float
-        Standard deviation that does not depend on range, with the error of the map, m.
-    dropout, outliers : float
-        Share of expected echoes that are not heard, and of readings that are anything.
-    """
+    """Errors of a range: rounding and noise, drop-outs, and echoes of what the room does not have."""
 
     resolution_m: float
+    """Step of the reported range, m; 0 = not rounded."""
     window_m: float
+    """Greatest range, m."""
     noise_relative: float = 0.01
+    """Standard deviation of the noise as a share of the range."""
     noise_m: float = 0.005
+    """Standard deviation that does not depend on range, with the error of the map, m."""
     dropout: float = 0.07
     outliers: float = 0.05
+    """Share of expected echoes that are not heard, and of readings that are anything."""
 
     @classmethod
     def of_ring(cls, ring: RingConfig) -> RangeModel:

@@ -19,29 +19,20 @@ FLAT_RAD: Final = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """The surfaces of a room in the map frame.
-
-    Attributes
-    ----------
-    walls : (w, 4) float
-        Both ends x1, y1, x2, y2 of each wall, m. A wall reflects on both sides.
-    normals : (w, 2) float
-        Unit normal of each wall: its direction turned counter-clockwise by a quarter.
-    offsets : (w,) float
-        Normal · point for the points of each wall, m.
-    corners : (c, 4) float
-        One row for each sector between successive walls that leave a point: x, y (m), the direction in which the
-        sector starts, and its opening counter-clockwise (rad). Below π it is a concave corner, above a convex edge;
-        2π at the free end of a wall.
-    circles : (k, 3) float
-        Centre x, y and radius of each round object, m.
-    """
+    """The surfaces of a room in the map frame."""
 
     walls: Floats
+    """(w, 4): both ends x1, y1, x2, y2 of each wall, m. A wall reflects on both sides."""
     normals: Floats
+    """(w, 2): unit normal of each wall: its direction turned counter-clockwise by a quarter."""
     offsets: Floats
+    """(w,): normal · point for the points of each wall, m."""
     corners: Floats
+    """(c, 4): one row for each sector between successive walls that leave a point: x, y (m), the direction in which
+    the sector starts, and its opening counter-clockwise (rad). Below π it is a concave corner, above a convex edge;
+    2π at the free end of a wall."""
     circles: Floats
+    """(k, 3): centre x, y and radius of each round object, m."""
 
     @property
     def area_m2(self) -> float:

@@ -18,23 +18,16 @@ UNKNOWN: Final = -1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KnownCells:
-    """The smallest rectangle of cells that holds all that is known.
-
-    Attributes
-    ----------
-    percent : (rows, columns) int8
-        Probability that something in the cell answers, 0 to 100, or `UNKNOWN`; row by row from the smallest y. Where
-        nothing is known it has no rows and columns.
-    x_m, y_m : float
-        The outer corner of the first cell, in the odometry's frame, m.
-    cell_m : float
-        Side of a cell, m.
-    """
+    """The smallest rectangle of cells that holds all that is known."""
 
     percent: NDArray[np.int8]
+    """(rows, columns): probability that something in the cell answers, 0 to 100, or `UNKNOWN`; row by row from the
+    smallest y. Where nothing is known it has no rows and columns."""
     x_m: float
     y_m: float
+    """The outer corner of the first cell, in the odometry's frame, m."""
     cell_m: float
+    """Side of a cell, m."""
 
 
 def known_cells(window: OccupancyWindow, side_max: int | None = None) -> KnownCells:

@@ -36,27 +36,18 @@ DRIVEN_MAX_M: Final = 1e6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ring:
-    """What a grid knows of the sensors.
-
-    Attributes
-    ----------
-    mounts : (n, 3) float
-        x, y (m), direction (rad) of each sensor in the ring's frame.
-    half_angle : float
-        Half the beam's width, rad.
-    rounding_m : float
-        Standard deviation of a range by its rounding, m.
-    reach_m : float
-        Longest range, m.
-    turning : tuple of int
-        The sensors that turn with the wheels, as `config.robot.RingConfig.turning`.
-    """
+    """What a grid knows of the sensors."""
 
     mounts: Floats
+    """(n, 3): x, y (m), direction (rad) of each sensor in the ring's frame."""
     half_angle: float
+    """Half the beam's width, rad."""
     rounding_m: float
+    """Standard deviation of a range by its rounding, m."""
     reach_m: float
+    """Longest range, m."""
     turning: tuple[int, ...] = ()
+    """The sensors that turn with the wheels, as `config.robot.RingConfig.turning`."""
 
 
 class Beams(NamedTuple):

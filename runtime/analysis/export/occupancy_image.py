@@ -49,19 +49,13 @@ OCCUPIED, UNKNOWN, FREE = 0, 205, 254
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OccupancyImage:
-    """An image of the floor.
-
-    Attributes
-    ----------
-    pixels : (rows, columns) uint8
-        Grey values; the first row is the farthest in y.
-    x_m, y_m : float
-        The lower left corner, m.
-    """
+    """An image of the floor."""
 
     pixels: NDArray[np.uint8]
+    """(rows, columns): grey values; the first row is the farthest in y."""
     x_m: float
     y_m: float
+    """The lower left corner, m."""
 
     def write(self, path: Path) -> Path:
         """Write the image (PGM) and beside it the YAML; return the path of the YAML.
