@@ -35,10 +35,7 @@ CAPABILITIES: Final[Mapping[str, str]] = MappingProxyType(
 def missing(has: Iterable[str]) -> dict[str, str]:
     """Return what a robot lacks that has what its family lists in `HAS`, with what follows.
 
-    Raises
-    ------
-    ValueError
-        One of them is no capability.
+    Raises `ValueError`: one of them is no capability.
     """
     named = set(has)
     if unknown := sorted(named - CAPABILITIES.keys()):

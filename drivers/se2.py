@@ -36,11 +36,7 @@ def log(pose: Pose) -> tuple[float, float, float]:
     """Return the constant twist (x, y, theta) that reaches `pose` from the origin in unit time.
 
     `pose.theta` is not wrapped. The inverse of V is [[c, h], [−h, c]] with h = θ/2, c = h/tan h.
-
-    Raises
-    ------
-    ValueError
-        `pose.theta` is a full turn or more: infinitely many twists, or none, lead there.
+    Raises `ValueError`: `pose.theta` is a full turn or more: infinitely many twists, or none, lead there.
     """
     if abs(pose.theta) >= 2.0 * math.pi:
         raise ValueError(f"a turn of {pose.theta:g} rad has no single twist: it must be less than a full turn")

@@ -96,10 +96,7 @@ def relaxed(bound: Bound | Fields) -> Bound | Fields:
 def check_values(name: str, values: NDArray[Any], bound: Bound) -> None:
     """Check all values of one number.
 
-    Raises
-    ------
-    ValueError
-        A value is out of its bound.
+    Raises `ValueError`: a value is out of its bound.
     """
     if values.dtype.kind == "b":
         values = values.view(np.uint8)  # any other byte than 0 and 1 misleads numpy

@@ -71,10 +71,7 @@ class KernelDigests:
     def of(self, kernel: Any, signature: str) -> str:  # noqa: ANN401 - a dispatcher, to which numba gives no type
         """Return the digest of a kernel for arguments of these types.
 
-        Raises
-        ------
-        TypeError
-            It uses a value that no digest covers.
+        Raises `TypeError`: it uses a value that no digest covers.
         """
         digest = hashlib.sha256(f"{self._tools}\n{signature}\n".encode())
         seen: dict[FunctionType, None] = {}

@@ -86,10 +86,7 @@ class Recogniser:
     def _check(self, poses: Floats, ranges_m: Floats, times_s: Floats, ring_yaws: Floats) -> None:
         """Check what a person may get wrong; compiled code reads it unchecked.
 
-        Raises
-        ------
-        ValueError
-            As `add` says.
+        Raises `ValueError`: as `add` says.
         """
         firings = len(poses)
         if poses.shape != (firings, 3):

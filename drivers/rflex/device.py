@@ -70,10 +70,7 @@ _I32 = 1 << 32
 class RflexDevice(EventDevice):
     """A `drivers.emulator.robot_device.RobotDevice` that speaks the rFLEX protocol.
 
-    Raises
-    ------
-    DriverError
-        The sonar banks do not fit the ring.
+    Raises `DriverError`: the sonar banks do not fit the ring.
     """
 
     # Reset by a restart; see `_boot`.

@@ -63,10 +63,7 @@ class Archive:
     def take(self, number: int) -> Structured:
         """Remove a record and return it, shape (1,).
 
-        Raises
-        ------
-        KeyError
-            There is none of this number.
+        Raises `KeyError`: there is none of this number.
         """
         at, last = self._index[number], self.count - 1
         row: Structured = self.archived_rows[at : at + 1].copy()

@@ -53,10 +53,7 @@ class RowFolder:
     def write(self, row: Row) -> None:
         """Write the row of a finished run.
 
-        Raises
-        ------
-        OSError
-            It cannot be written.
+        Raises `OSError`: it cannot be written.
         """
         self._rows.mkdir(exist_ok=True)
         with whole_file(self._rows / f"{row['key']}.json") as part:
@@ -101,10 +98,7 @@ def like_each_other(values: Sequence[Value]) -> list[Value]:
 def write_table(study: StudyConfig, columns: Mapping[str, list[Any]], folder: Path) -> Path:
     """Write the table as Parquet, with the study in its metadata, and return the file.
 
-    Raises
-    ------
-    OSError
-        It cannot be written.
+    Raises `OSError`: it cannot be written.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq

@@ -131,10 +131,7 @@ class RunningPreparation:
     def progress(self, run_s: float) -> str | None:
         """Return how far it is in the cycle that begins at `run_s`; None once recognition is ready.
 
-        Raises
-        ------
-        UserError
-            The preparation failed.
+        Raises `UserError`: the preparation failed.
         """
         if self._preparation is None or self._task is None:
             return None

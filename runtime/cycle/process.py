@@ -210,11 +210,7 @@ class RobotProcess:
 
         `arm`: arm once, as soon as the robot is ready. `seconds`: counted from the first cycle with recognition, by
         the run's clock.
-
-        Raises
-        ------
-        UserError
-            The port cannot be opened, or the robot does not answer as it should.
+        Raises `UserError`: the port cannot be opened, or the robot does not answer as it should.
         """
         with self.health.catching_unhandled_errors():
             await self._preparation.start(self._settings, self._connection, self._stop.is_set)

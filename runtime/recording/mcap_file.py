@@ -28,11 +28,7 @@ class McapFile:
 
     `path`: replaced if it exists. `info`: the first message, written in a chunk of its own with schemas and channels.
     `log_ns`: its log time, Unix time in ns.
-
-    Raises
-    ------
-    OSError
-        The file cannot be created or written.
+    Raises `OSError`: the file cannot be created or written.
     """
 
     def __init__(self, path: Path, info: bytes, log_ns: int) -> None:

@@ -190,10 +190,7 @@ class Recorder:
     def undo_bookmark(self) -> str:
         """Withdraw the last bookmark that was not withdrawn; return its text.
 
-        Raises
-        ------
-        UserError
-            There is none, its file is finished, or the disk is too slow.
+        Raises `UserError`: there is none, its file is finished, or the disk is too slow.
         """
         if not self._bookmarks:
             raise UserError("there is no bookmark of this run to withdraw")

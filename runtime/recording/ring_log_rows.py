@@ -151,10 +151,7 @@ class RingLogRows:
     def check_not_empty(self) -> None:
         """Refuse a ring log without a firing.
 
-        Raises
-        ------
-        RingLogError
-            No row was written.
+        Raises `RingLogError`: no row was written.
         """
         if self.count == 0:
             raise RingLogError(f"{self._path}: there is no firing to write; a ring log holds at least one")

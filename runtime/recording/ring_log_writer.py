@@ -89,10 +89,7 @@ class RingLogWriter:
     def _write(self, firing: Firing) -> None:
         """Write a firing.
 
-        Raises
-        ------
-        OSError
-            It is lost: the background writer counts it.
+        Raises `OSError`: it is lost: the background writer counts it.
         """
         if self._file is None or self._rows is None:
             raise OSError(self.last_error)  # counted as lost

@@ -52,11 +52,8 @@ class ServoColumns:
 
         `ranges`, shape (sensors,): NaN where a sensor did not fire. `bearings`: of `sensors`, rad; NaN where a cell
         is empty.
-
-        Raises
-        ------
-        ValueError
-            A sensor that fired has no bearing, or one that its servo does not have; the text names the column.
+        Raises `ValueError`: a sensor that fired has no bearing, or one that its servo does not have; the text names
+        the column.
         """
         found = np.full(self._views.count, math.nan)
         turned = dict(zip(self.sensors, bearings, strict=True))
@@ -72,10 +69,7 @@ class ServoColumns:
     def row(self, ranges: Floats) -> tuple[list[float], list[float]]:
         """Return the ranges by sensor, and the bearings of `sensors`, of ranges by mount.
 
-        Raises
-        ------
-        ValueError
-            A sensor fired at two bearings at once.
+        Raises `ValueError`: a sensor fired at two bearings at once.
         """
         by_sensor = [math.nan] * self.sensor_count
         turned: dict[int, float] = {}

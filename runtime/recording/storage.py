@@ -87,10 +87,7 @@ class SingleFile:
     def begin_part(self, part: int) -> Path:
         """Return the path of a file, numbered from 1: the first as the user named it, a later one is created.
 
-        Raises
-        ------
-        OSError
-            A later file cannot be created.
+        Raises `OSError`: a later file cannot be created.
         """
         if part == 1:
             return self.first
@@ -162,11 +159,7 @@ class RotatingFolder:
         """Create a file, numbered from 1, and return its path; it counts as one of this run.
 
         Where another run has files of this name, `run` changes.
-
-        Raises
-        ------
-        OSError
-            It cannot be created.
+        Raises `OSError`: it cannot be created.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         run, number = self.run, 1
@@ -360,9 +353,7 @@ def find_recording(folder: Path, name: str) -> Path | None:
 def recordings_folder(config: RecordingConfig) -> Path:
     """Return the folder of the settings, or else `echolocate/runs` in the user's state folder.
 
-    Raises
-    ------
-    UserError
-        The settings name the home folder of a user that has none, or see `runtime.support.user_folders`.
+    Raises `UserError`: the settings name the home folder of a user that has none, or see
+    `runtime.support.user_folders`.
     """
     return expanded(config.folder, "recording.folder") if config.folder else state_folder() / "runs"

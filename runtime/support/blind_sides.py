@@ -182,10 +182,7 @@ def way_refusal(settings: Settings, course_rad: float | None) -> str | None:
 def refuse_blind_ways(settings: Settings) -> None:
     """Raise an error if the run's goal or mission leads where the ring never looks.
 
-    Raises
-    ------
-    UserError
-        It does; the text says where the robot can drive.
+    Raises `UserError`: it does; the text says where the robot can drive.
     """
     goal, course_rad = settings.goal, None
     if goal is not None and goal.frame == "odom":

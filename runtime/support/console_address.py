@@ -53,10 +53,7 @@ def announced(url: str, folder: Path) -> Iterator[None]:
 def find_consoles(folder: Path) -> list[str]:
     """Return the start URLs of this user's runs on this machine, the newest first.
 
-    Raises
-    ------
-    UserError
-        There is no run, or a file is not this user's alone.
+    Raises `UserError`: there is no run, or a file is not this user's alone.
     """
     found = []
     with contextlib.suppress(OSError):

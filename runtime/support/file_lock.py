@@ -27,11 +27,7 @@ def file_lock(path: Path, named: str) -> Iterator[None]:
 
     Only regular files are locked: a pipe or /dev/null has no content that two writers could spoil.
     `path`: the file. `named`: how an error message names it, e.g. ``--record run.csv``.
-
-    Raises
-    ------
-    UserError
-        Another process holds the lock, or the file cannot be opened.
+    Raises `UserError`: another process holds the lock, or the file cannot be opened.
     """
     try:
         fd = _lock(path)

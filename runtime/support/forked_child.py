@@ -77,11 +77,7 @@ async def fork(main: Callable[[], None], arguments: Sequence[str], environment: 
 
     `main`: runs the program, as if it had just been started; its end is that of the process. `arguments`: of the
     program, without its name. `environment`: variables of its environment beside those of this process.
-
-    Raises
-    ------
-    OSError
-        The system makes no further process, or no further files.
+    Raises `OSError`: the system makes no further process, or no further files.
     """
     (inputs, to_child), (from_child, outputs), (errors_of_child, errors) = os.pipe(), os.pipe(), os.pipe()
     for stream in (sys.stdout, sys.stderr):

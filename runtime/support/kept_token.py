@@ -25,11 +25,7 @@ def kept_token(folder: Path, make: Callable[[], str]) -> str:
     """Return the token that is kept in a folder; make and keep one if there is none.
 
     `folder`: the program's state folder; created if it does not exist. `make`: returns a new token.
-
-    Raises
-    ------
-    UserError
-        The file holds no token, others may read or write it, or it cannot be read or created.
+    Raises `UserError`: the file holds no token, others may read or write it, or it cannot be read or created.
     """
     path = folder / NAME
     try:
@@ -62,10 +58,7 @@ def _create(path: Path, make: Callable[[], str]) -> None:
 def _read(path: Path) -> str:
     """Return the file's token.
 
-    Raises
-    ------
-    UserError
-        It holds none, or is not this user's alone.
+    Raises `UserError`: it holds none, or is not this user's alone.
     """
     held = read_private(path, _BYTES_MAX)
     if held is None:

@@ -105,11 +105,7 @@ def cache_folder() -> Path:
     Numba unpickles what it finds there, so a user who can write into it can run code as this one. It is in the user's
     cache; where that cannot be written or others can write into it, it is a new folder for this process and its
     children, which is removed at the end.
-
-    Raises
-    ------
-    UserError
-        Neither can be created.
+    Raises `UserError`: neither can be created.
     """
     own = users_own(user_cache_path)
     if own is not None:

@@ -210,11 +210,7 @@ class KernelPreparation:
         """Return what recognition begins with, when no kernel of the other parts is left to compile or to load.
 
         Both are loaded and made in threads of `in_thread`.
-
-        Raises
-        ------
-        UserError
-            They could not be compiled.
+        Raises `UserError`: they could not be compiled.
         """
         if uncompiled_parts(self._folder, self._all_parts):
             self._process = await start_child(

@@ -87,10 +87,7 @@ class LogFile:
 def may_be_log(path: Path) -> bool:
     """Return whether there is no such file, nothing in it, or a log: one of its first lines is an event in JSON.
 
-    Raises
-    ------
-    OSError
-        The file cannot be read.
+    Raises `OSError`: the file cannot be read.
     """
     try:
         if not path.is_file():

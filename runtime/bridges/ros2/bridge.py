@@ -139,10 +139,7 @@ class _Bridge:
     def _connected(self) -> Operator:
         """Return the operator of the connection.
 
-        Raises
-        ------
-        ConsoleError
-            There is none.
+        Raises `ConsoleError`: there is none.
         """
         if self._operator is None:
             raise ConsoleError(NO_RUN)

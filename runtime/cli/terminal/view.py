@@ -168,10 +168,7 @@ class View:
     def _pass_on(self) -> None:
         """Pass on what is new, the newest snapshot only; at the end, close the pipe, which ends the other process.
 
-        Raises
-        ------
-        BrokenPipeError
-            That process has ended before.
+        Raises `BrokenPipeError`: that process has ended before.
         """
         picture = self._picture
         if picture is None or picture.stdin is None or picture.stderr is None:
