@@ -49,6 +49,7 @@ NEAR_M: Final = 1.5
 """A drum is looked at from a place this near to its surface; it was driven round once such places …"""
 ROUND_RAD: Final = math.pi
 """… lie in directions from it that span so much, rad."""
+NO_WAY: Final = "the room leaves this robot no way to a goal"
 SECTORS: Final = 12
 """Directions from a drum that are distinguished."""
 
@@ -144,7 +145,10 @@ def run_room(
     places = [space.place((i, j)) for i, j in np.argwhere(space.free).tolist()]
     inside = sorted((place for place in places if _inside(place, corners)), key=lambda place: -math.hypot(*place))
     # A small robot also has room within a box, where no way leads out.
-    begin = next(place for place in inside if next_goal(np.random.default_rng(seed), space, place, reach) is not None)
+    leads_on = (place for place in inside if next_goal(np.random.default_rng(seed), space, place, reach) is not None)
+    if (begin := next(leads_on, None)) is None:
+        result.reasons[NO_WAY] = 1
+        return result
     start = StartConfig(x_m=begin[0], y_m=begin[1], heading_deg=float(rng.uniform(-180.0, 180.0)))
     world = world.model_copy(update={"start": start})
     device, driver = make_device(settings, world, seed), make_driver(settings)

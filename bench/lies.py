@@ -28,7 +28,7 @@ from runtime.cycle.drive_requests import first_request, needs_recognition
 from runtime.cycle.echo_watch import NOTHING_NEW, NOTHING_YET
 from runtime.cycle.inputs import OperatorInput, Request, gather_inputs
 from runtime.cycle.modes import Mode
-from runtime.cycle.mounting_limit import DOUBTED
+from runtime.cycle.mounting_limit import ARM_DOUBTED, DOUBTED
 from runtime.cycle.preparation import fresh_state
 from runtime.cycle.step import apply_command, step
 from runtime.cycle.unheard_limit import LOST, REMEMBERED, UNHEARD
@@ -197,7 +197,7 @@ def run_trial(
     budget, cycle = QuantumBudget(QUANTA_PER_CYCLE), 0
     until_s = begin_s + (HONEST_S if kind is None else LIE_S)
     is_turned = (kind or "").startswith("turned") or (kind == "one backwards" and settings.ring.has_servo)
-    names = frozenset[str]() if kind is None else HELD | {DOUBTED} if is_turned else HELD
+    names = frozenset[str]() if kind is None else HELD | {ARM_DOUBTED, DOUBTED} if is_turned else HELD
     run_s = before_m_s = speed_m_s = contact_m_s = way_m = 0.0
     place = device.truth.pose
     contact_s = named_s = said = held = None

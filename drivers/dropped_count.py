@@ -12,8 +12,9 @@ LATE_FIRINGS: Final = (
     "line loses bytes or the robot's clock jumps: check the cable and what else uses the line"
 )
 RANGES_BEYOND: Final = (
-    "{} ranges were dropped so far: they lie beyond the window of their firing, as echoes of an earlier one do; if "
-    "there are ever more, set a longer ring.firing.window_m or step_period_s"
+    "{} ranges were dropped so far: they lie beyond the window of their firing, as echoes of an earlier one do, or "
+    "the maximum of a sensor that hears nothing; if there are ever more, set a longer ring.firing.window_m or "
+    "step_period_s, or let the sensor report no echo there (`echolocate ring-test` shows which does not)"
 )
 
 

@@ -123,7 +123,9 @@ class FaultySonar:
         for silent in faults.all(SilentRing):
             ranges[self._those(silent.sensors) & (self._fired % silent.every == 0)] = math.inf
         for reported in faults.all(ReportedSilence):
-            ranges[self._those(reported.sensors) & np.isinf(ranges)] = reported.range_m
+            # A greatest range also stands for what a longer window hears farther away.
+            is_silent = np.isinf(ranges) | ((ranges > reported.range_m) & (reported.range_m > 0.0))
+            ranges[self._those(reported.sensors) & is_silent] = reported.range_m
         for coarse in faults.all(CoarseRanges):
             which = self._those(coarse.sensors)
             ranges[which] = coarse.step_m * np.round(ranges[which] / coarse.step_m)

@@ -59,8 +59,13 @@ from perception.sensor_mounts import mounts_array, ring_pose, turn_mounts
 
 _TURNED: Final = (
     "the ranges change as if the ring were mounted turned by {} against the robot file: check how it is mounted, "
-    "its cables and the order of its sensors (on a servo: how the arm sits), then re-arm"
+    "its cables and the order of its sensors, then re-arm"
 )
+_ARM_TURNED: Final = (
+    "the ranges change as if the sensor looked {} away from where its servo should turn it: check how its arm sits "
+    "on the servo, and the servo's pulses, then re-arm"
+)
+_QUARTERS: Final = ("90°, counter-clockwise,", "180°", "90°, clockwise,")
 _CHANGED: Final = (
     "the readings of the whole ring changed at once, as no motion changes them: {}; check the ring's power, cables "
     "and controller, and the odometry for a jump, then re-arm"
@@ -73,9 +78,7 @@ REASONS: Final = MappingProxyType(
         "ring hears nothing, or not all; check its power and cables and what covers it, then re-arm",
         SCATTERED: "the ring's readings are unrelated from one firing to the next: they do not come from what is "
         "there; check the ring for noise, crosstalk and loose cables, and the odometry for a jump, then re-arm",
-        TURNED: _TURNED.format("90°, counter-clockwise,"),
-        TURNED + 1: _TURNED.format("180°"),
-        TURNED + 2: _TURNED.format("90°, clockwise,"),
+        **{TURNED + k: _TURNED.format(turn) for k, turn in enumerate(_QUARTERS)},
         CHANGED + LENGTHENED: _CHANGED.format("all ranges are longer or shorter by the same length"),
         CHANGED + EXCHANGED: _CHANGED.format(
             "each sensor hears what another one heard, as if the ring had been turned"
@@ -83,6 +86,10 @@ REASONS: Final = MappingProxyType(
     }
 )
 """What happened, the likely cause, the next action."""
+SERVO_REASONS: Final = MappingProxyType(
+    {**REASONS, **{TURNED + k: _ARM_TURNED.format(turn) for k, turn in enumerate(_QUARTERS)}}
+)
+"""The same of a single sensor on a servo."""
 WIRED: Final = CHANGED + EXCHANGED + 1
 """From here on, a finding is WIRED + i·n + j for sensors i and j of n that are exchanged; for i = j it looks
 backwards, for i = n sensor j is deaf."""
@@ -176,6 +183,7 @@ class RingMonitor:
         self._ring_records = records(RingTrace, self._ring)
         servo = ring.lone_servo
         self._may_be_turned = servo is not None or not ring.has_servo
+        self._reasons = REASONS if servo is None else SERVO_REASONS
         self._pivot = np.zeros(2) if servo is None else np.array([servo.x_m, servo.y_m])
         self._directions = zeros(DirectionTrace, 0 if servo is None else LOOK_DIRECTIONS)
         self._direction_records = records(DirectionTrace, self._directions)
@@ -245,7 +253,7 @@ class RingMonitor:
             n = len(self._exchanged_nat)
             i, j = divmod(found - WIRED, n)
             return deaf_reason(j) if i == n else wiring_reason(i, j)
-        return None if found == NOTHING else REASONS[found]
+        return None if found == NOTHING else self._reasons[found]
 
     def possible_obstacles(self) -> Floats:
         """Return where the last echoes came from if the ring is turned, as far as that is not excluded: (k, 2), m.

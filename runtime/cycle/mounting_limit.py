@@ -23,8 +23,11 @@ MOUNTED: Final = (
 )
 DOUBTED: Final = (
     "the ranges change as if the ring were mounted turned: the robot drives slowly until more of them decide it; if "
-    "this lasts, check how the ring is mounted, its cables and the order of its sensors (on a servo: "
-    "how the arm sits)"
+    "this lasts, check how the ring is mounted, its cables and the order of its sensors"
+)
+ARM_DOUBTED: Final = (
+    "the ranges change as if the sensor looked elsewhere than its servo should turn it: the robot drives slowly "
+    "until more of them decide it; if this lasts, check how its arm sits on the servo"
 )
 
 
@@ -47,7 +50,7 @@ def limit_by_mounting(
     if abs(twist.v) <= CREEP_M_S:
         return twist, why
     if monitor.is_doubted:
-        return Twist(math.copysign(CREEP_M_S, twist.v), twist.w), DOUBTED
+        return Twist(math.copysign(CREEP_M_S, twist.v), twist.w), ARM_DOUBTED if settings.ring.has_servo else DOUBTED
     body, speed = settings.body, abs(twist.v)
     reach_m, brake_m_s2 = body.radius_m + settings.behaviors.arbiter.clearance_m, 2.0 * body.acceleration_max_m_s2
     way = pose.theta + (0.0 if twist.v > 0.0 else math.pi)

@@ -51,9 +51,9 @@ def refuse_undrivable(settings: Settings) -> None:
         The robot cannot fire so; or the pattern leaves out sensors that look along the way, looks there too seldom
         for the age limit, or listens no farther than the clearance.
     """
-    make_driver(settings)
-    if settings.body == NO_BODY:  # a run refuses it, and nothing else drives
+    if settings.body == NO_BODY:  # a run refuses it, and nothing else drives or fires
         return
+    make_driver(settings)
     arbiter, body = settings.behaviors.arbiter, settings.body
     age_path = "behaviors.avoid_static_obstacle.echo_age_max_s"
     for course in courses_rad(settings):
@@ -80,14 +80,22 @@ def refuse_undrivable(settings: Settings) -> None:
         enough_s = math.ceil(10.0 * (oldest_s + arbiter.base_velocity_m_s / body.acceleration_max_m_s2)) / 10.0
         raise FiringError(
             f"ring.firing: a look {where} can be {oldest_s:.2f} s old, and counts for {age_path} "
-            f"{view.age_max_s:g} s, so that the robot could not drive; {more_looks(settings.ring)} or make "
-            f"step_period_s shorter, or make {age_path} at least {enough_s:g}"
+            f"{view.age_max_s:g} s, so that the robot could not drive; {more_looks(settings.ring)}, or make "
+            f"{age_path} at least {enough_s:g}"
         )
 
 
 def more_looks(ring: RingConfig) -> str:
-    """Return by which change of its firing pattern a ring looks in each direction more often."""
-    return "give the servo fewer bearings" if ring.has_servo else "fire more sensors at a time"
+    """Return by which changes of its firing pattern a ring looks in each direction more often."""
+    faster = "make step_period_s shorter"
+    if not ring.has_servo:
+        is_all = firing_pattern(ring).set_size == ring.sensor_count
+        return faster if is_all else f"fire more sensors at a time, or {faster}"
+    beam_deg = 2.0 * ring.beam_half_angle_deg
+    on_servo = (sensor for sensor in ring.sensors or () if sensor.servo)
+    # With one bearing fewer, the beams must still meet.
+    are_dense = all(one.sweep_deg <= beam_deg * (one.bearings - (1 if one.is_endless else 2)) for one in on_servo)
+    return f"give the servo {'fewer bearings' if are_dense else 'a narrower sweep'}, or {faster}"
 
 
 def pattern_speed_m_s(settings: Settings, missed: int = 0) -> float:

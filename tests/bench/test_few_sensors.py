@@ -11,6 +11,7 @@ import pytest
 from behaviors.move_to_goal import Goal
 from bench.few_sensors import (
     AWAY_M,
+    NO_WAY,
     few_sensors_table,
     make_world,
     measure,
@@ -60,6 +61,12 @@ def test_a_small_robot_does_not_begin_within_a_box() -> None:
     requests = list[DriveRequest]()
     run_room("hobby3", "cone", 8600, 0.5, lambda _, state, __: requests.append(state.drive_request))
     assert isinstance(requests[-1], Goal)
+
+
+def test_a_room_that_leaves_a_robot_no_way_is_counted_as_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.few_sensors.next_goal", lambda *_: None)
+    result = run_room("hobby3", "cone", 8600, 0.5)
+    assert (result.goals, result.reasons) == (0, {NO_WAY: 1})
 
 
 @pytest.mark.soak

@@ -14,7 +14,7 @@ from drivers.messages import Firing, Pose
 from perception.kernel import Floats
 from perception.records import records, zeros
 from perception.ring_faults.memory import EVIDENCE_NAT, NO_ECHO_M, QUARTERS, EchoTrace, RingTrace
-from perception.ring_faults.monitor import REASONS, RingMonitor
+from perception.ring_faults.monitor import REASONS, SERVO_REASONS, RingMonitor
 from perception.ring_faults.motion_tests import TURNED
 from perception.ring_faults.mounting import EXCLUDED_NAT
 from perception.ring_faults.servo_mounting import (
@@ -103,8 +103,9 @@ def test_an_arm_that_is_put_on_turned_is_doubted(reflection: str, quarter: int) 
 def test_an_arm_that_is_put_on_turned_is_named(quarter: int) -> None:
     _, way, reason = driven("cone", quarter, 2, 2.5)
     assert way < 2.2
-    assert reason == REASONS[TURNED + quarter - 1]
-    assert "arm" in reason
+    assert reason == SERVO_REASONS[TURNED + quarter - 1]
+    assert "how its arm sits on the servo" in reason
+    assert "arm" not in REASONS[TURNED + quarter - 1].replace("re-arm", "")
 
 
 SERVO = SensorConfig(x_m=0.0, y_m=0.0, angle_deg=0.0, servo=True, bearings=13, sweep_deg=180.0)

@@ -10,7 +10,8 @@ import pytest
 from config.load import load_settings
 from drivers.messages import Firing, Pose, Twist
 from perception.ring_faults.monitor import RingMonitor
-from runtime.cycle.mounting_limit import DOUBTED, MOUNTED, limit_by_mounting
+from perception.ring_faults.mounting import DOUBTED_NAT
+from runtime.cycle.mounting_limit import ARM_DOUBTED, DOUBTED, MOUNTED, limit_by_mounting
 from runtime.cycle.unheard_limit import CREEP_M_S
 
 SETTINGS = load_settings("room", robot="denning")
@@ -79,3 +80,6 @@ def test_a_sensor_on_a_servo_whose_arm_may_be_turned_limits_the_speed() -> None:
     twist, why = limit_by_mounting(FAST, None, Pose(1.0, 0.0, 0.0), monitor, settings)
     assert (twist.w, why) == (FAST.w, MOUNTED)
     assert twist.v < FAST.v
+    monitor._ring["turned_nat"][0, 1] = DOUBTED_NAT
+    _, why = limit_by_mounting(FAST, None, Pose(1.0, 0.0, 0.0), monitor, settings)
+    assert why == ARM_DOUBTED

@@ -33,7 +33,7 @@ def test_a_pattern_that_limits_the_speed_is_named() -> None:
 def test_a_sensor_on_a_servo_looks_more_often_with_fewer_bearings() -> None:
     warnings = lint_settings(load_settings("room", ["ring.firing.step_period_s=0.015"], robot="servo1"))
     assert warnings[1].startswith("ring.firing: the pattern looks ahead so seldom")
-    assert warnings[1].endswith("give the servo fewer bearings")
+    assert warnings[1].endswith("give the servo fewer bearings, or make step_period_s shorter")
 
 
 def test_a_ring_that_one_failed_reading_stops_is_named() -> None:

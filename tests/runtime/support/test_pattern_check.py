@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from config.load import list_shipped, load_settings
+from config.robot import NO_BODY, FiringConfig, SensorConfig
 from drivers.driver import DriverError
 from drivers.firing_pattern import FiringError, firing_pattern
 from runtime.support.pattern_check import (
@@ -16,6 +17,7 @@ from runtime.support.pattern_check import (
     crosstalk_note,
     gap_note,
     longest_gaps_s,
+    more_looks,
     pattern_speed_m_s,
     refuse_undrivable,
 )
@@ -104,10 +106,32 @@ def test_a_synchro_drive_must_see_along_each_leg_and_others_ahead() -> None:
     assert courses_rad(load_settings("hallway", [STOP])) == (0.0,)
 
 
+def test_a_robot_file_for_replays_alone_needs_no_firing_pattern() -> None:
+    """The usual one fires eight sensors at a time, which three do not divide into."""
+    settings = load_settings("hallway", robot="hobby3")
+    ring = settings.ring.model_copy(update={"firing": FiringConfig(preset="octets")})
+    refuse_undrivable(settings.model_copy(update={"ring": ring, "body": NO_BODY}))
+    with pytest.raises(FiringError, match="3 sensors do not divide by 8"):
+        refuse_undrivable(settings.model_copy(update={"ring": ring}))
+
+
 def test_what_the_robot_itself_cannot_do_is_refused_as_before() -> None:
     assert "step_period_s 0.001 is shorter than sound takes" in problem("ring.firing.step_period_s=0.001")
     with pytest.raises(DriverError):
         refuse_undrivable(load_settings("hallway", ["robot.driver=nonesuch"]))
+
+
+def test_by_what_a_ring_looks_more_often() -> None:
+    """With one bearing fewer, 180 degrees by five leave gaps between beams of ±25 degrees; by nine they do not."""
+    hobby, servo = load_settings("room", robot="hobby3").ring, load_settings("room", robot="servo1").ring
+    faster = "make step_period_s shorter"
+    assert more_looks(hobby) == f"fire more sensors at a time, or {faster}"
+    assert more_looks(hobby.model_copy(update={"firing": FiringConfig(sets=((0, 1, 2),))})) == faster
+    assert more_looks(servo) == f"give the servo fewer bearings, or {faster}"
+    for bearings, said in ((5, "a narrower sweep"), (9, "fewer bearings")):
+        sensor = SensorConfig(x_m=0.0, y_m=0.0, angle_deg=0.0, servo=True, bearings=bearings, sweep_deg=180.0)
+        ring = servo.model_copy(update={"sensors": (sensor,), "beam_half_angle_deg": 25.0})
+        assert more_looks(ring) == f"give the servo {said}, or {faster}"
 
 
 def test_the_longest_gap_of_each_sensor() -> None:

@@ -12,14 +12,23 @@ from typing import Final
 
 from config.robot import RingConfig
 
-HAND_MAX_M: Final = 0.4
+HELD_M: Final = (0.1, 0.3)
+"""A hand is held so far from a sensor, m, or as much farther as the sensor hears nothing nearer."""
+FARTHER_M: Final = 0.05
+"""A hand is asked for farther from a sensor than its least range by this, m."""
 NEARER_M: Final = 0.1
-"""A hand is nearer than this, and nearer than what a sensor heard before by this, m."""
+"""A hand is not farther than was asked for by this, m, and nearer than what the sensor heard before by this."""
 READINGS: Final = 3
 """So many readings in a row of a sensor are of the hand."""
 _SAME_RAD: Final = math.radians(5.0)
 _SIDES: Final = ("ahead", "ahead to the left", "to the left", "behind to the left", "behind",
                  "behind to the right", "to the right", "ahead to the right")  # fmt: skip
+
+
+def held_m(ring: RingConfig) -> tuple[float, float]:
+    """Return how near to a sensor of a ring a hand is held, and how far from it, m."""
+    near_m = max(HELD_M[0], ring.range_min_m + FARTHER_M)
+    return near_m, near_m + HELD_M[1] - HELD_M[0]
 
 
 class HandWatch:
@@ -29,10 +38,13 @@ class HandWatch:
     ----------
     before : sequence of float
         What each sensor heard before, m; +inf for nothing.
+    far_m : float
+        How far from a sensor a hand is held at most, m.
     """
 
-    def __init__(self, before: Sequence[float]) -> None:
+    def __init__(self, before: Sequence[float], far_m: float) -> None:
         self._before = tuple(before)
+        self._far_m = far_m + NEARER_M
         self._near = [0] * len(self._before)
         self._free = [False] * len(self._before)
 
@@ -53,7 +65,7 @@ class HandWatch:
         for i, (range_m, before_m) in enumerate(zip(ranges, self._before, strict=True)):
             if math.isnan(range_m):
                 continue
-            is_near = range_m < min(HAND_MAX_M, before_m - NEARER_M)
+            is_near = range_m < min(self._far_m, before_m - NEARER_M)
             self._near[i] = self._near[i] + 1 if is_near else 0
             self._free[i] |= not is_near
         found = [i for i, near in enumerate(self._near) if near >= READINGS and self._free[i]]
@@ -66,7 +78,7 @@ def side_of(angle_rad: float) -> str:
     return f"{_SIDES[round(degrees / 45.0) % 8]} ({degrees:.0f} degrees)"
 
 
-def judge_hands(ring: RingConfig, answered: Sequence[int | None]) -> list[str]:
+def judge_hands(ring: RingConfig, answered: Sequence[int | None], before: Sequence[float]) -> list[str]:
     """Return what is wrong, a line each; none if each sensor answered in its place.
 
     Parameters
@@ -75,6 +87,8 @@ def judge_hands(ring: RingConfig, answered: Sequence[int | None]) -> list[str]:
         Without servos.
     answered : sequence of int, optional
         Which sensor answered the hand in the place of each; None if none did.
+    before : sequence of float
+        What each sensor heard before, m; +inf for nothing.
     """
     axes = [mount.angle_rad for mount in ring.mounts]
     if all(answer is None for answer in answered):
@@ -97,12 +111,18 @@ def judge_hands(ring: RingConfig, answered: Sequence[int | None]) -> list[str]:
         f"their wires, or correct the order of SENSORS or of ring.sensors"
         for i, answer in wrong
     ]
-    return [*lines, *(deaf_text(i, axes[i]) for i, answer in enumerate(answered) if answer is None)]
+    return [*lines, *(deaf_text(i, axes[i], before[i]) for i, answer in enumerate(answered) if answer is None)]
 
 
-def deaf_text(sensor: int, angle_rad: float) -> str:
-    """Return the finding about a sensor that does not hear a hand in this direction."""
+def deaf_text(sensor: int, angle_rad: float, before_m: float) -> str:
+    """Return the finding about a sensor that does not hear a hand in this direction, and what it heard before, m."""
+    missed = f"sensor {sensor} DOES NOT HEAR a hand {side_of(angle_rad)}"
+    if before_m < math.inf:
+        return (
+            f"{missed}, and it reports {before_m:.2f} m: it looks elsewhere, or always reports that; clear what is "
+            f"nearer than the hand, see how the sensor is mounted, then check its wires or replace it"
+        )
     return (
-        f"sensor {sensor} DOES NOT HEAR a hand {side_of(angle_rad)}: check its 5 V and its wires of trigger and "
-        f"echo; an echo of 5 V needs a divider to the board's 3.3 V"
+        f"{missed}: check its 5 V and its wires of trigger and echo; an echo of 5 V needs a divider to the board's "
+        f"3.3 V"
     )

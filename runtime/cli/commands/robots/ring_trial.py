@@ -8,12 +8,13 @@ import statistics
 import sys
 import time
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from contextlib import suppress
+from typing import Final
 
 from serial.tools.list_ports import comports
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from config.robot import FiringConfig, RingConfig, RobotConfig
+from config.robot import SOUND_SPEED_M_S, FiringConfig, RingConfig, RobotConfig
 from drivers.base_model import stop_s
 from drivers.driver import LineState
 from drivers.firing_pattern import FiringError, firing_pattern
@@ -21,7 +22,8 @@ from drivers.link import Link
 from drivers.messages import Flags, Floats, Odometry, Twist
 from drivers.registry import line_options, make_driver
 from runtime.cli.commands.robots.crosstalk_trial import crosstalk
-from runtime.cli.commands.robots.hand_trial import HandWatch, judge_hands, side_of
+from runtime.cli.commands.robots.hand_trial import HandWatch, held_m, judge_hands, side_of
+from runtime.cli.commands.robots.sensor_trial import Finding, judge_sensor, not_shown, sensor_lines, unsteadiness_of
 from runtime.cli.commands.robots.servo_trial import hands_before, judge_servo_hands, not_shown_by_hands, stuck_servos
 from runtime.cycle.connection import POLL_S, Connection
 
@@ -37,16 +39,8 @@ HAND_S: Final = 15.0
 """So long a hand before a sensor is waited for, s."""
 DRIVE_S: Final = 0.05
 """Time from one velocity to the next, s, as of a run: a line that is full of them carries no request."""
-UNSTEADY_M: Final = 0.1
-"""Ranges of a robot that stands still do not spread farther than this, m, apart from a tenth of them at each end."""
-ANSWERS_MIN: Final = 0.8
-"""Share of the firings that a good sensor answers; no more than the rest may be ranges that it cannot measure."""
-REPEATS_MIN: Final = 5
-"""Fewest equal ranges that count as always the same."""
-FINE_M: Final = 1e-3
-STEPS_MIN: Final = 3.0
-"""The others' spread must be so many steps of the ranges, of 1 mm at least, that rounding does not explain a sensor
-that always says the same."""
+LISTEN_M: Final = 7.0
+"""Longest window of the test, m: modules that hold their echo pin for 38 ms where they hear nothing say 6.5 m."""
 MOTIONS: Final = (
     ("forward", Twist(0.1, 0.0)),
     ("backward", Twist(-0.1, 0.0)),
@@ -60,17 +54,19 @@ WAY_MIN, WAY_MAX = 0.4, 1.6
 def with_single_firing(config: RobotConfig) -> RobotConfig:
     """Return the robot with the preset `single`: one sensor at a time, or one of each of its arrays.
 
-    Period and window stay; listeners and sets are left out. `config` is returned unchanged if its driver cannot fire
-    that way.
+    The period stays, and the window becomes as long as it allows, or also stays: a maximum in place of nothing may
+    lie beyond what the sensor measures. Listeners and sets are left out. `config` is returned unchanged if its driver
+    cannot fire that way.
     """
-    own = config.ring.firing
-    firing = FiringConfig(preset="single", step_period_s=own.step_period_s, window_m=own.window_m)
-    single = config.model_copy(update={"ring": config.ring.model_copy(update={"firing": firing})})
-    try:
-        make_driver(single)
-    except FiringError:
-        return config
-    return single
+    ring, own = config.ring, config.ring.firing
+    longest_m = min(LISTEN_M, 0.5 * SOUND_SPEED_M_S * own.step_period_s)
+    for window_m in (max(ring.window_m, longest_m), own.window_m):
+        firing = FiringConfig(preset="single", step_period_s=own.step_period_s, window_m=window_m)
+        single = config.model_copy(update={"ring": ring.model_copy(update={"firing": firing})})
+        with suppress(FiringError):
+            make_driver(single)
+            return single
+    return config
 
 
 def only_port() -> str:
@@ -86,96 +82,6 @@ def only_port() -> str:
         found = f"found {', '.join(ports)}" if ports else "found none: is the robot plugged in?"
         raise UserError(f"name the robot's port, as in `echolocate ring-test /dev/ttyACM0`; {found}", WRONG_CALL)
     return str(ports[0])
-
-
-class Finding(NamedTuple):
-    """What was found out about a sensor, or a motion."""
-
-    is_good: bool
-    text: str
-
-
-def judge_sensor(ranges: list[float], rounds: int, ring: RingConfig, unsteadiness: float = 0.0) -> Finding:
-    """Return the finding about a sensor.
-
-    Parameters
-    ----------
-    ranges
-        What it reported in so many firings: m, +inf no echo, no faults.
-    rounds
-        Number of firings.
-    ring
-        The ring, for what its sensors can measure.
-    unsteadiness
-        Spread of the ranges of the other sensors, as a share of the range.
-    """
-    heard = sorted(value for value in ranges if math.isfinite(value))
-    if not ranges:
-        return Finding(
-            is_good=False,
-            text="NO ANSWER within its window: check its supply, and its trigger and echo wires; hold something flat "
-            "in front of it: if it answers then, it must report no echo where it hears nothing, and not its maximum",
-        )
-    if len(ranges) < ANSWERS_MIN * rounds:
-        return Finding(is_good=False, text=f"answers {len(ranges)} times of {rounds}: check for a loose wire")
-    if not heard:
-        return Finding(is_good=True, text="hears nothing: --hand shows whether it does")
-    if (wrong := impossible(heard, len(ranges), ring)) is not None:
-        return Finding(is_good=False, text=wrong)
-    median_m, tenth = statistics.median(heard), len(heard) // 10
-    spread_m = heard[-1 - tenth] - heard[tenth]
-    text = f"{median_m:.3f} m, {len(heard)} echoes of {len(ranges)}"
-    if heard[0] == heard[-1] and len(heard) >= REPEATS_MIN:
-        if unsteadiness * median_m > STEPS_MIN * max(ring.resolution_m, FINE_M):
-            text = f"STUCK at {median_m:.4f} m, while the ranges of the others vary: check its wires, then replace it"
-            return Finding(is_good=False, text=text)
-        return Finding(is_good=True, text=f"{text}, always the same: see that it changes with a hand in front of it")
-    if spread_m > UNSTEADY_M:
-        text += f", unsteady by {spread_m:.2f} m: does something move, or does it receive its neighbours?"
-        return Finding(is_good=True, text=text)
-    return Finding(is_good=True, text=f"{text}, within {spread_m * 1e3:.0f} mm")
-
-
-def impossible(heard: list[float], count: int, ring: RingConfig) -> str | None:
-    """Return the text about ranges that the sensors cannot measure; None if at most a fifth of the firings has any.
-
-    Parameters
-    ----------
-    heard
-        The finite ranges, m, sorted.
-    count
-        Number of firings.
-    ring
-        The ring.
-    """
-    few, half_step_m = (1.0 - ANSWERS_MIN) * count, max(0.5 * ring.resolution_m, 1e-6)
-    zeros = sum(value <= 0.0 for value in heard)
-    below = sum(value < ring.range_min_m + half_step_m for value in heard)
-    beyond = sum(value > ring.range_max_m - half_step_m for value in heard)
-    if zeros > few:
-        return (
-            f"ZERO in {zeros} of {count} firings: check the wire of its echo pin; if the sensor reports 0 where it "
-            f"hears nothing, its driver must report that as no echo"
-        )
-    if below > few:
-        return (
-            f"TOO SHORT, {heard[0]:.4f} m, in {below} of {count} firings, and ring.range_min_m is "
-            f"{ring.range_min_m:g}: check that nothing touches it; a waterproof module needs a trigger of 20 µs or "
-            f"more: make TRIGGER_US in robot_config.py longer; then check its echo wire"
-        )
-    if beyond > few:
-        return (
-            f"AT ITS MAXIMUM, {heard[-1]:.3f} m, in {beyond} of {count} firings: it hears nothing and must report "
-            f"that as no echo; hold something flat in front of it to see that it hears at all"
-        )
-    return None
-
-
-def unsteadiness_of(ranges: list[list[float]], number: int) -> float:
-    """Return the median spread of the ranges of all sensors but one, as a share of the range; 0 without any."""
-    others = (sorted(filter(math.isfinite, each)) for other, each in enumerate(ranges) if other != number)
-    shares = [(each[-1] - each[0]) / each[0] for each in others if len(each) >= REPEATS_MIN and each[0] > 0.0]
-    return statistics.median(shares) if shares else 0.0
 
 
 def judge_motion(asked: Twist, before: Odometry, after: Odometry, flags: Flags, seconds: float) -> Finding:
@@ -254,12 +160,19 @@ class RingTest:
         try:
             identity = self._driver.identity
             if identity is not None:
-                self._write(f"robot '{identity.name}' on {self._config.link.port}, {identity.sensors} sensors\n")
+                name, count = self._config.robot.name or identity.name, identity.sensors
+                self._write(f"robot '{name}' on {self._config.link.port}, {count} sensor{'s' * (count != 1)}\n")
             ranges = await self._listen(self._config.ring, rounds)
             together = await self._together(rounds)
-            is_good = self._judge(ranges, rounds, together)
+            is_good, unshown = self._judge(ranges, rounds, together)
             if hand:
                 is_good = await self._test_places(ranges) and is_good
+            else:
+                is_good &= not unshown
+                one = len(unshown) == 1
+                which = f"sensor{'s' * (not one)} {', '.join(map(str, unshown))} hear{'s' * one}"
+                hears = f"whether {which}, and " if unshown else ""
+                self._write(f"not shown: {hears}where each sensor looks: run with --hand\n")
             if move:
                 is_good = await self._test_motors() and is_good
         finally:
@@ -295,30 +208,40 @@ class RingTest:
         await self._pass(SETTLE_S, None)
         return ranges
 
-    def _judge(self, ranges: list[list[float]], rounds: int, together: list[list[float]] | None) -> bool:
-        """Write what is found of each sensor; return whether all are good."""
+    def _judge(
+        self, ranges: list[list[float]], rounds: int, together: list[list[float]] | None
+    ) -> tuple[bool, list[int]]:
+        """Write the finding about each sensor; return whether all are good, and those not shown to hear."""
         ring = self._config.ring
         disturbed = {} if together is None or self._own is None else crosstalk(ranges, together, self._own)
         findings = [
             judge_sensor(each, rounds, ring, unsteadiness_of(ranges, number)) for number, each in enumerate(ranges)
         ]
-        stuck = stuck_servos(ring, [statistics.median(each) if each else math.inf for each in ranges])
-        for number, (mount, finding) in enumerate(zip(ring.mounts, findings, strict=True)):
-            text = disturbed.get(number, finding.text) if finding.is_good else finding.text
-            self._write(f"sensor {number:2} at {math.degrees(mount.angle_rad):4.0f} degrees: {text}\n")
+        medians = [statistics.median(each) if each else math.inf for each in ranges]
+        # A range that no sensor measures has causes of its own.
+        stuck = stuck_servos(ring, medians) if all(one.is_good for one in findings) else {}
+        texts = [disturbed.get(i, one.text) if one.is_good else one.text for i, one in enumerate(findings)]
+        for line in sensor_lines(ring, texts):
+            self._write(f"{line}\n")
         for sensor, text in stuck.items():
             self._write(f"sensor {sensor} on its servo: {text}\n")
-        return all(finding.is_good for finding in findings) and not disturbed and not stuck
+        is_good = all(finding.is_good for finding in findings) and not disturbed and not stuck
+        return is_good, not_shown(ring, findings)
 
     async def _test_places(self, ranges: list[list[float]]) -> bool:
         """Ask for a hand before each sensor, and write which of them does not answer in its place."""
         ring = self._config.ring
-        watch = HandWatch([statistics.median(each) if each else math.inf for each in ranges])
-        answered, heard = list[int | None](), list[frozenset[int]]()
+        before, (near_m, far_m) = [statistics.median(each) if each else math.inf for each in ranges], held_m(ring)
+        watch = HandWatch(before, far_m)
+        answered, heard, asked = (
+            list[int | None](),
+            list[frozenset[int]](),
+            f"{100 * near_m:.0f} to {100 * far_m:.0f}",
+        )
         for sensor, angle_rad in hands_before(ring):
             # A sensor beside one on a servo may hear a hand sooner than the bearing that looks there.
             own = {k for k, of in enumerate(ring.sensor_of) if of == sensor or not ring.has_servo}
-            self._write(f"hold something flat 10 to 30 cm from the robot, {side_of(angle_rad)} …\n")
+            self._write(f"hold something flat {asked} cm from the sensor, {side_of(angle_rad)} …\n")
             sys.stdout.flush()
             watch.ask()
             found, answering, deadline_s = None, frozenset[int](), self._clock() + HAND_S
@@ -328,7 +251,7 @@ class RingTest:
                         found, answering = now, watch.answering
             answered.append(found)
             heard.append(answering)
-        wrong = judge_servo_hands(ring, heard) if ring.has_servo else judge_hands(ring, answered)
+        wrong = judge_servo_hands(ring, heard, before) if ring.has_servo else judge_hands(ring, answered, before)
         for line in [*(wrong or ["each sensor answers in its place"]), *not_shown_by_hands(ring)]:
             self._write(f"{line}\n")
         return not wrong

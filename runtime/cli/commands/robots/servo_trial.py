@@ -68,7 +68,7 @@ def stuck_servos(ring: RingConfig, medians: Sequence[float]) -> dict[int, str]:
     return found
 
 
-def judge_servo_hands(ring: RingConfig, heard: Sequence[Collection[int]]) -> list[str]:
+def judge_servo_hands(ring: RingConfig, heard: Sequence[Collection[int]], before: Sequence[float]) -> list[str]:
     """Return what is wrong, a line each; none if each sensor hears each hand where it is.
 
     Parameters
@@ -77,6 +77,8 @@ def judge_servo_hands(ring: RingConfig, heard: Sequence[Collection[int]]) -> lis
         The ring.
     heard : sequence of collection of int
         Which bearings heard each of `hands_before`.
+    before : sequence of float
+        What each bearing heard before, m; +inf for nothing.
     """
     hands, of = hands_before(ring), ring.sensor_of
     lines = []
@@ -91,7 +93,7 @@ def judge_servo_hands(ring: RingConfig, heard: Sequence[Collection[int]]) -> lis
                 f"there: exchange their wires, or correct the order of SENSORS or of ring.sensors"
             )
         elif not any(which for _, which in own):
-            lines.append(deaf_text(i, own[0][0]))
+            lines.append(deaf_text(i, own[0][0], min(before[k] for k in _bearings(ring, i))))
         elif sensor.servo and (wrong := _wrong_servo(ring, i, own)) is not None:
             lines.append(wrong)
     return lines

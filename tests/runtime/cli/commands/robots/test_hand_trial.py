@@ -9,10 +9,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from config.load import load_settings
+from config.load import load_robot, load_settings
 from config.robot import RingConfig
 from drivers.messages import Floats
-from runtime.cli.commands.robots.hand_trial import HandWatch, judge_hands, side_of
+from runtime.cli.commands.robots.hand_trial import HandWatch, held_m, judge_hands, side_of
 from runtime.cli.commands.robots.ring_trial import RingTest, with_single_firing
 
 FRONT = (30.0, 0.0, -30.0)
@@ -86,11 +86,19 @@ def test_a_sensor_that_never_hears_an_echo_is_named(monkeypatch: pytest.MonkeyPa
     is_good, lines = outcome(FRONT3, lambda place: None if place == 1 else place, monkeypatch)
     assert not is_good
     assert "sensor 1 DOES NOT HEAR a hand ahead (0 degrees)" in lines[0]
-    assert "needs a divider" in lines[0]
+    assert "and it reports 1.50 m: it looks elsewhere" in lines[0]
+    (deaf,) = judge_hands(FRONT3, [0, None, 2], [FREE_M, math.inf, FREE_M])
+    assert "sensor 1 DOES NOT HEAR a hand ahead (0 degrees): check its 5 V" in deaf
+    assert "needs a divider" in deaf
+
+
+def test_a_hand_is_held_where_the_sensor_can_hear_it() -> None:
+    assert held_m(FRONT3) == pytest.approx((0.1, 0.3))
+    assert held_m(load_robot("parking12").ring) == pytest.approx((0.3, 0.5))
 
 
 def test_a_hand_counts_from_when_it_is_asked_for() -> None:
-    watch = HandWatch([math.inf, 1.0])
+    watch = HandWatch([math.inf, 1.0], 0.3)
     watch.ask()
     assert [watch.take([0.2, math.nan]) for _ in range(3)] == [None, None, 0]
     watch.ask()
@@ -102,4 +110,4 @@ def test_directions_are_said_in_words() -> None:
     assert side_of(0.0) == "ahead (0 degrees)"
     assert side_of(math.radians(91.0)) == "to the left (91 degrees)"
     assert side_of(math.radians(182.0)) == "behind (-178 degrees)"
-    assert judge_hands(FRONT3, [0, 1, 2]) == []
+    assert judge_hands(FRONT3, [0, 1, 2], [FREE_M] * 3) == []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import time
 import tty
 from collections import Counter
@@ -12,56 +13,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
 from config.errors import DONE, FAILED, UserError
 from config.files import list_shipped
 from config.load import load_robot, load_settings
-from config.robot import FiringConfig, RingConfig
-from drivers.emulator.faults import Fault, StuckSensor
+from drivers.emulator.event_device import EventDevice
+from drivers.emulator.faults import Fault, StuckSensor, SuddenObject
+from drivers.emulator.scene import NOWHERE
 from drivers.messages import Flags, Floats, Odometry, Pose, Twist
 from drivers.registry import make_device
 from runtime.cli.app import run_command
 from runtime.cli.commands.robots import ring_trial
-from runtime.cli.commands.robots.ring_trial import RingTest, judge_motion, judge_sensor, only_port, with_single_firing
+from runtime.cli.commands.robots.ring_trial import RingTest, judge_motion, only_port, with_single_firing
 from tests.drivers.firmware.board import install, start
 from tests.drivers.ros2 import robot as ros_robot
 from tests.hil.machine import TIMEOUT_S
 from tests.runtime.virtual_time import MemoryLink, VirtualLoop
-
-INF = math.inf
-RING = RingConfig(
-    count=12,
-    radius_m=0.09,
-    beam_half_angle_deg=15.0,
-    resolution_m=0.003,
-    range_min_m=0.02,
-    range_max_m=4.0,
-    firing=FiringConfig(preset="quadrants"),
-)
-
-
-@pytest.mark.parametrize(
-    ("ranges", "is_good", "said"),
-    [
-        ([], False, "NO ANSWER"),
-        ([1.0] * 15, False, "15 times of 20"),
-        ([INF] * 20, True, "hears nothing"),
-        ([1.0, 1.003] * 10, True, "1.002 m, 20 echoes of 20, within 3 mm"),
-        ([1.0] * 19 + [3.0], True, "within 0 mm"),
-        ([1.0] * 20, False, "STUCK at 1.0000 m"),
-        ([0.1] * 20, True, "always the same: see that it changes"),
-        ([0.0017] * 20, False, "TOO SHORT, 0.0017 m, in 20 of 20 firings"),
-        ([0.0017] * 3 + [1.0, 1.003] * 8 + [1.0], True, "1.000 m"),
-        ([0.0] * 20, False, "ZERO in 20 of 20"),
-        ([0.0] * 10 + [1.0, 1.003] * 5, False, "ZERO in 10 of 20"),
-        ([4.0] * 20, False, "AT ITS MAXIMUM, 4.000 m, in 20 of 20"),
-        ([1.0, 1.5] * 8 + [INF] * 4, True, "16 echoes of 20, unsteady by 0.50 m"),
-    ],
-)
-def test_what_is_found_out_about_a_sensor(ranges: list[float], is_good: bool, said: str) -> None:
-    finding = judge_sensor(ranges, 20, RING, unsteadiness=0.01)
-    assert finding.is_good is is_good
-    assert said in finding.text
 
 
 def odometry(x: float, y: float, theta: float) -> Odometry:
@@ -100,18 +68,41 @@ def test_without_a_port_there_must_be_exactly_one(monkeypatch: pytest.MonkeyPatc
     assert only_port() == "/dev/ttyACM0"
 
 
+HAND = SuddenObject(kind="sudden_object", at_s=1e6, radius_m=0.1)
+"""What is held before a sensor; its time never comes."""
+COMES_S = 1.0
+"""The hand comes so long after it is asked for."""
+ASKED = re.compile(r"hold something flat (\d+) to (\d+) cm from the sensor, .*\((-?\d+) degrees\)")
+
+
 def reports_of(
-    robot: str, monkeypatch: pytest.MonkeyPatch, *faults: Fault, move: bool = False
+    robot: str, monkeypatch: pytest.MonkeyPatch, *faults: Fault, move: bool = False, hand: bool = False
 ) -> tuple[int, list[str]]:
     """Test a shipped robot in virtual time, given what fails; return the exit code and the lines."""
     loop, said = VirtualLoop(), list[str]()
     config = load_settings("room", ("link.port=memory",), robot=robot)
     assert config.world is not None
-    device = make_device(config, config.world, 3, faults=faults)
+    device = make_device(config, config.world, 3, faults=[*faults, HAND])
+    assert isinstance(device, EventDevice)
     monkeypatch.setattr(ring_trial, "Link", lambda *args, **_options: MemoryLink(device, loop, *args))
+
+    def write(text: str) -> None:
+        said.append(text.rstrip())
+        if (asked := ASKED.match(text)) is None:
+            return
+        near, far, degrees = map(int, asked.groups())
+        mount = min(
+            config.ring.mounts, key=lambda m: abs(math.remainder(m.angle_rad - math.radians(degrees), math.tau))
+        )
+        away_m = 0.005 * (near + far) + HAND.radius_m
+        c, s = math.cos(mount.angle_rad), math.sin(mount.angle_rad)
+        at = device.truth.pose.compose(Pose(mount.x_m + away_m * c, mount.y_m + away_m * s, 0.0))
+        device._body.set_object(0, NOWHERE)
+        loop.call_later(COMES_S, device._body.set_object, 0, (at.x, at.y, HAND.radius_m))
+
     try:
-        test = RingTest(with_single_firing(config), said.append, loop.time)
-        code = loop.run_until_complete(test.run(10, move=move))
+        test = RingTest(with_single_firing(config), write, loop.time, config.ring)
+        code = loop.run_until_complete(test.run(10, move=move, hand=hand))
     finally:
         loop.close()
     return code, [line for line in said if not line.startswith("note: ")]
@@ -139,8 +130,11 @@ def test_every_shipped_robot_is_tested_and_a_sensor_that_reads_what_it_cannot_is
     config = load_robot(robot)
     count = len(config.ring.mounts)
     code, lines = reports_of(robot, monkeypatch)
-    assert code == DONE, lines
-    assert sum(line.startswith("sensor ") for line in lines) == count
+    heard = [line for line in lines if line.startswith("sensor ")]
+    (shown,) = (line for line in lines if line.startswith("not shown: "))
+    assert code == (FAILED if "whether " in shown else DONE), lines
+    assert len(heard) == count or config.ring.has_servo
+    assert all("hears nothing" in line or " echoes of " in line for line in heard)
     for sensor, range_m, said in (
         (min(count, 24) - 1, 0.1 * config.ring.range_min_m, ("TOO SHORT",)),
         (0, 0.0, ("ZERO", "TOO SHORT", "NO ANSWER")),  # a driver drops a 0 that its protocol does not have
@@ -148,15 +142,58 @@ def test_every_shipped_robot_is_tested_and_a_sensor_that_reads_what_it_cannot_is
     ):
         fault = StuckSensor(kind="stuck_sensor", at_s=0.0, duration_s=1e3, sensor=sensor, range_m=range_m)
         code, lines = reports_of(robot, monkeypatch, fault)
-        (found,) = (line for line in lines if line.startswith(f"sensor {sensor:2}"))
+        degrees = math.degrees(config.ring.mounts[sensor].angle_rad)
+        (found,) = (
+            line for line in lines if line.startswith(f"sensor {config.ring.sensor_of[sensor]:2} at {degrees:4.0f} ")
+        )
         assert any(each in found for each in said), found
-        assert code == FAILED or "hears nothing" in found
+        assert code == FAILED
+
+
+HOBBY = [pytest.param(one, marks=[] if one in OF_EACH_KIND else [pytest.mark.soak]) for one in
+         ("hobby3", "hobby8", "parking12", "servo1")]  # fmt: skip
+
+
+def lie(kind: str, **values: object) -> Fault:
+    """Return a fault that is there from the start."""
+    adapter: TypeAdapter[Fault] = TypeAdapter(Fault)
+    return adapter.validate_python({"kind": kind, "at_s": 0.0, "duration_s": 1e4} | values)
+
+
+@pytest.mark.parametrize("robot", HOBBY)
+def test_what_robots_of_hobby_parts_are_built_with_is_named(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the ranges, or by a hand before each sensor; without a hand nothing that it would show passes as good."""
+    ring = load_robot(robot).ring
+    ahead = ring.sensor_of[int(np.argmin([abs(math.remainder(m.angle_rad, math.tau)) for m in ring.mounts]))]
+    one = [i for i, sensor in enumerate(ring.sensor_of) if sensor == ahead]
+    alone, greatest_m = ring.sensor_count == 1, ring.range_max_m
+    code, lines = reports_of(robot, monkeypatch, hand=True)
+    assert (code, lines[-1]) == (DONE, "each sensor answers in its place")
+    assert lines[0].startswith(f"robot '{robot}' ")
+    for fault, is_by_hand, said in (
+        (lie("constant_ring", sensors=one, range_m=0.0017), False, "TOO SHORT"),
+        (lie("reported_silence", sensors=one, range_m=0.0), True, None if not alone else "TOO SHORT"),
+        (lie("constant_ring", sensors=one, range_m=greatest_m), False, "AT ITS MAXIMUM"),
+        (lie("reported_silence", range_m=greatest_m), False, "AT ITS MAXIMUM"),
+        (lie("constant_ring", sensors=one, range_m=1.0), False, "ONE RANGE" if alone else "STUCK|always the same"),
+        (lie("silent_ring", sensors=one), True, f"sensor {ahead} DOES NOT HEAR"),
+        (lie("silent_ring"), True, "DOES NOT HEAR" if alone else "NO SENSOR heard"),
+        (lie("turned_ring", sensors=one, angle_deg=180.0), True, "TURNED" if alone else "DOES NOT HEAR|EXCHANGED"),
+        (lie("turned_ring", angle_deg=180.0), True, "NO SENSOR heard" if robot == "hobby3" else "TURNED"),
+        (lie("swapped_sensors", first=0, second=2), True, None if alone else "EXCHANGED"),
+    ):
+        if said is not None:
+            code, lines = reports_of(robot, monkeypatch, fault, hand=is_by_hand)
+            assert code == FAILED
+            assert re.search(said, "\n".join(lines)), (said, lines)
 
 
 @pytest.mark.parametrize("robot", EACH_ROBOT)
 def test_the_motors_of_every_shipped_robot_are_good(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
     code, lines = reports_of(robot, monkeypatch, move=True)
-    assert code == DONE, lines
+    assert code == DONE or "whether " in "".join(lines), lines
+    assert sum(line.startswith("motors ") for line in lines) == 4
+    assert not any("not what was asked" in line for line in lines)
 
 
 @pytest.fixture
@@ -218,7 +255,8 @@ def test_the_motors_of_the_real_firmware(plugged: list[str], capsys: pytest.Capt
     capsys.readouterr()
     assert run_command(["ring-test", *plugged, "--rounds", "2", "--move"]) == DONE
     lines = capsys.readouterr().out.splitlines()
-    assert lines[13].startswith("WARNING: the wheels turn in")
-    assert [line.split(":")[0] for line in lines[14:18]] == [
+    assert lines[13].startswith("not shown: where each sensor looks")
+    assert lines[14].startswith("WARNING: the wheels turn in")
+    assert [line.split(":")[0] for line in lines[15:19]] == [
         "motors forward", "motors backward", "motors left (counter-clockwise from above)", "motors right",
     ]  # fmt: skip

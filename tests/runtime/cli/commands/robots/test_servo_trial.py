@@ -40,6 +40,11 @@ BEAM_RAD = math.radians(20.0)
 FREE_M, HAND_M = 1.5, 0.2
 
 
+def judged(ring: RingConfig, heard: list[list[int]]) -> list[str]:
+    """Return what is wrong with sensors that heard nothing before."""
+    return judge_servo_hands(ring, heard, [math.inf] * len(ring.mounts))
+
+
 def heard_at(ring: RingConfig, looks: Callable[[float], float]) -> list[list[int]]:
     """Return which bearings hear each hand, given where the sensor truly looks for a bearing that is asked for."""
     return [
@@ -65,14 +70,14 @@ def heard_at(ring: RingConfig, looks: Callable[[float], float]) -> list[list[int
 )
 def test_what_hands_show_of_a_servo(ring: RingConfig, looks: Callable[[float], float], said: str | None) -> None:
     heard = heard_at(ring, looks) if said != "DOES NOT HEAR" else [[], []]
-    lines = judge_servo_hands(ring, heard)
+    lines = judged(ring, heard)
     assert [said in line for line in lines] == [True] if said else lines == []
 
 
 def test_an_arm_that_is_put_on_turned_is_named() -> None:
-    (line,) = judge_servo_hands(TURNING, heard_at(TURNING, lambda a: a + math.pi))
+    (line,) = judged(TURNING, heard_at(TURNING, lambda a: a + math.pi))
     assert "TURNED: sensor 0 looks 180 degrees away" in line
-    (line,) = judge_servo_hands(TO_AND_FRO, heard_at(TO_AND_FRO, lambda a: a - math.radians(60.0)))
+    (line,) = judged(TO_AND_FRO, heard_at(TO_AND_FRO, lambda a: a - math.radians(60.0)))
     assert "does not get there" in line
 
 
@@ -92,18 +97,18 @@ def heard_among_fixed(wired: dict[int, int], deaf: int | None = None) -> list[li
 
 
 def test_beside_fixed_sensors_only_what_is_exchanged_is_called_so() -> None:
-    assert judge_servo_hands(AMONG_FIXED, heard_among_fixed({})) == []
-    left = judge_servo_hands(AMONG_FIXED, heard_among_fixed({0: 1, 1: 0}))
+    assert judged(AMONG_FIXED, heard_among_fixed({})) == []
+    left = judged(AMONG_FIXED, heard_among_fixed({0: 1, 1: 0}))
     assert left[0].startswith("EXCHANGED: a hand ahead (0 degrees) is heard by sensor 1, and sensor 0 belongs there")
-    sides = judge_servo_hands(AMONG_FIXED, [[6], [12], [12, 14], [0, 13]])
+    sides = judged(AMONG_FIXED, [[6], [12], [12, 14], [0, 13]])
     assert [line.partition(" is heard by sensor ")[2][:1] for line in sides] == ["2", "1"]
-    (deaf,) = judge_servo_hands(AMONG_FIXED, heard_among_fixed({}, deaf=1))
+    (deaf,) = judged(AMONG_FIXED, heard_among_fixed({}, deaf=1))
     assert deaf.startswith("sensor 1 DOES NOT HEAR a hand to the left")
-    (late,) = judge_servo_hands(AMONG_FIXED, [[6], [1 + 12], [13], [14]])
+    (late,) = judged(AMONG_FIXED, [[6], [1 + 12], [13], [14]])
     assert "its servo does not get there" in late
     heard = heard_among_fixed({})
     heard[1] = [14]
-    (side,) = judge_servo_hands(AMONG_FIXED, heard)
+    (side,) = judged(AMONG_FIXED, heard)
     assert side.startswith("EXCHANGED: a hand to the left (90 degrees) is heard by sensor 2")
 
 
@@ -116,7 +121,7 @@ def test_what_hands_in_a_narrow_sweep_do_not_show_is_said(sweep_deg: float, said
     ring = TO_AND_FRO.model_copy(
         update={"sensors": (sensor.model_copy(update={"sweep_deg": sweep_deg, "bearings": 5}),)}
     )
-    still, mirrored = (judge_servo_hands(ring, heard_at(ring, looks)) for looks in (lambda _: 0.0, lambda a: -a))
+    still, mirrored = (judged(ring, heard_at(ring, looks)) for looks in (lambda _: 0.0, lambda a: -a))
     lines = not_shown_by_hands(ring)
     assert [said in line for line in lines] == [True] if said else lines == []
     assert (still == mirrored == []) == (sweep_deg == 30.0)
