@@ -16,7 +16,7 @@ from behaviors.surroundings.field_of_view import path_half_angle_rad, seen_speed
 from config.errors import WRONG_CALL, UserError
 from config.settings import Settings
 from perception.percept import Pose
-from runtime.support.pattern_check import oldest_percept
+from runtime.support.pattern_check import gap_note, oldest_percept
 
 SAME_RAD: Final = 1e-6
 """Beams that overlap by less end side by side."""
@@ -80,11 +80,12 @@ def blind_notes(settings: Settings) -> list[str]:
         )
     else:
         back_m_s = _speed_m_s(settings, math.pi)
-        if back_m_s < SLOW_SHARE * arbiter.base_velocity_m_s:
-            allowed = "not at all" if back_m_s == 0.0 else f"at {back_m_s:.2f} m/s at most"
+        # A robot that does not drive ahead gets into no dead end.
+        if gap_note(settings) is None and back_m_s < SLOW_SHARE * arbiter.base_velocity_m_s:
+            back = "never drives backwards" if back_m_s == 0.0 else f"drives backwards at {back_m_s:.2f} m/s at most"
             notes.append(
-                f"ring: backwards the robot drives {allowed}; out of a dead end it turns on the spot, which needs no "
-                "look as the body is round, and then stands until the ring has looked along the new way"
+                f"ring: the robot {back}; out of a dead end it turns on the spot, which needs no look as the body is "
+                "round, and then stands until the ring has looked along the new way"
             )
     if heard_deg < STAND_DEG:
         notes.append(

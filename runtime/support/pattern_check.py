@@ -136,7 +136,7 @@ def _gap_note(settings: Settings, course_rad: float) -> str:
     beam_deg = math.degrees(view.half_angle_rad)
     path_deg = math.degrees(path_half_angle_rad(settings.body, settings.behaviors.arbiter.clearance_m))
     ends = zip([-180.0 - beam_deg, *axes], [*axes, 180.0 + beam_deg], strict=True)
-    shift = math.degrees(course_rad)
+    shift, where = math.degrees(course_rad), "ahead" if course_rad == 0.0 else "along that leg"
     gaps = [
         f"{begin + beam_deg + shift:.0f}° to {end - beam_deg + shift:.0f}°"
         for begin, end in ends
@@ -144,7 +144,7 @@ def _gap_note(settings: Settings, course_rad: float) -> str:
     ]
     return (
         f"ring: no beam covers {' and '.join(gaps)} (counter-clockwise from the ring's front), and the path needs "
-        f"every direction within {path_deg:.0f}° of the way: the robot may turn, but never drives there; "
+        f"every direction within {path_deg:.0f}° of the way, so the robot turns, but never drives {where}; "
         f"{ring_that_drives(beam_deg, path_deg)}, or correct ring.beam_half_angle_deg or body.radius_m"
     )
 

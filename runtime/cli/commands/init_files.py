@@ -24,6 +24,10 @@ from runtime.support.config_lint import lint_settings
 from runtime.support.pattern_check import refuse_undrivable
 
 AT_A_TIME: Final = ((8, "octets"), (4, "quadrants"), (3, "thirds"), (2, "opposite_pairs"), (1, "single"))
+PROTOCOLS: Final = (
+    "  denning: a board of one's own, Pico or ESP32, with the files of `echolocate firmware`\n"
+    "  arcos: a Pioneer or its relatives; rflex: a B21r or ATRV-Jr; ros2: topics of ROS 2"
+)
 CORNERS: Final = 16
 """Of the outline of a round model."""
 
@@ -50,6 +54,7 @@ def write_robot(file: str, given: Given, *, yes: bool, force: bool) -> int:
 
 def _robot_draft(file: str, ask: Questions) -> RobotDraft:
     """Return the robot as options and answers describe it."""
+    ask.say(PROTOCOLS)
     driver = ask.choice("driver", "The robot's protocol", driver_names())
     name = ask.text("name", "What the robot is called", Path(file).stem)
     most = {"denning": 24, "arcos": 32, "rflex": 64, "ros2": 24}.get(driver, SENSORS_MAX)

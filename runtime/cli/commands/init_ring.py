@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -55,11 +54,10 @@ def ask_mounting(ask: Questions, robot: Described) -> Mounting:
         What is known of it.
     """
     beam_deg = robot.beam_half_angle_deg
-    _say(
-        ask,
+    ask.say(
         f"A body of {robot.body_radius_m:g} m must see every direction within {robot.path_deg:.0f}° of its way: "
         f"{ring_that_drives(beam_deg, robot.path_deg)}.\n"
-        "  all-round: no blind sides: it may go anywhere, backwards too; most sensors\n"
+        "  all-round: with so many no blind sides: it may go anywhere, backwards too\n"
         "  in-front: blind beside and behind: it looks to both sides every 2.5 m, and never drives backwards\n"
         "  one-by-one: each sensor's place and direction\n"
         "Each fires in turn: a ring of many sensors looks less often, which limits the speed.",
@@ -74,7 +72,7 @@ def ask_mounting(ask: Questions, robot: Described) -> Mounting:
         return Mounting(sensors, ring_m, None)
     apart = 0.0
     if layout == "in-front" and sensors > 1:
-        _say(ask, f"Beams more than {2.0 * beam_deg:g}° apart leave gaps, which the robot does not drive into.")
+        ask.say(f"Beams more than {2.0 * beam_deg:g}° apart leave gaps, which the robot does not drive into.")
         default = min(usual_deg, max(1, 180 // sensors))
         apart = ask.number("spacing", "Degrees from one sensor to the next", default, 0.5, 180.0)
     placed = []
@@ -90,9 +88,3 @@ def ask_mounting(ask: Questions, robot: Described) -> Mounting:
             y = ask.number(f"y_{k}", f"Place of sensor {k} to the left, m", y, -10.0, 10.0)
         placed.append((x, y, angle_deg))
     return Mounting(None, None, tuple(placed))
-
-
-def _say(ask: Questions, text: str) -> None:
-    """Write what an answer costs, where a person is asked."""
-    if ask.asks:
-        sys.stderr.write(f"{text}\n")

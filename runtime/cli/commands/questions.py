@@ -79,6 +79,11 @@ class Questions:
 
         return self._answer(name, f"{question} ({', '.join(choices)})", choices[0], parse)
 
+    def say(self, text: str) -> None:
+        """Write what the next answers mean or cost, where a person is asked."""
+        if self.asks:
+            sys.stderr.write(f"{text}\n")
+
     def is_given(self, name: str) -> bool:
         """Return whether an option is given that is a flag."""
         self._used.add(name)

@@ -32,6 +32,7 @@ from runtime.simulation.closed_loop import simulate
 from tests.perception.halls import drive
 from tests.recorded import entries_of, rewrite
 from tests.runtime.recording.moments import (
+    FOLLOWING,
     OUT_OF_BOUNDS,
     POISONED_CYCLE,
     Moment,
@@ -42,6 +43,8 @@ from tests.runtime.recording.moments import (
 
 CHECKED_EVERY = 16
 """Cycles from one check of an honest state to the next."""
+SERVO_CYCLE = 200
+"""By then the robot has driven past what its sensor hears."""
 BOUNDS_CHECKED = os.environ.get("NUMBA_BOUNDSCHECK", "0") not in {"", "0"}
 JOB = "method.memory.state.job."
 
@@ -279,6 +282,41 @@ def test_random_states_within_the_bounds_are_harmless(moments: dict[int, Moment]
             check_snapshot(snapshot, moment.perception().snapshot(), moment.bounds())
             found[ends_in_error(moment, snapshot)] += 1
     assert found[False] >= 6
+
+
+@pytest.fixture(scope="module")
+def servo_moment() -> Moment:
+    """Return a moment of a drive with one sensor on a servo, which has heard something in most directions."""
+    settings, taken = load_settings("room", robot="servo1"), list[Moment]()
+    assert settings.world is not None
+
+    def on_state(record: CycleRecord, state: State, _start: object) -> None:
+        if record.cycle == SERVO_CYCLE:
+            is_honest(state.perception, settings)
+            taken.append(Moment(record.cycle, settings, carried_state(state), state.perception.snapshot(), []))
+        elif taken and len(taken[0].following) < FOLLOWING:
+            taken[0].following.append(record)
+
+    simulate(settings, settings.world, 2, (SERVO_CYCLE + FOLLOWING + 1) / settings.cycle.rate_hz, on_state=on_state)
+    return taken[0]
+
+
+@pytest.mark.compiled
+@pytest.mark.boundscheck
+def test_a_poisoned_state_of_a_sensor_on_a_servo_is_refused_or_harmless(servo_moment: Moment) -> None:
+    """Its ring remembers what it heard by direction of the room; all else is as of other rings."""
+    assert not ends_in_error(servo_moment, servo_moment.snapshot)
+    heard = dict(numbers_of(servo_moment.snapshot))["ring_monitor._directions.heard.range_m"]
+    assert np.count_nonzero(heard >= 0.0) > 10
+    found = poison_all(servo_moment, lambda name: "_directions" in name)
+    assert found["refused"] > 100
+    assert found["harmless"] > found["ended"]
+    rng = np.random.default_rng(4)
+    for _ in range(12 if BOUNDS_CHECKED else 4):
+        snapshot = randomised(servo_moment, rng)
+        with contextlib.suppress(ValueError):
+            check_snapshot(snapshot, servo_moment.perception().snapshot(), servo_moment.bounds())
+            ends_in_error(servo_moment, snapshot)
 
 
 @pytest.mark.compiled

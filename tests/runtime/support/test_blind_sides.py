@@ -65,13 +65,14 @@ def test_of_strips_that_never_end_the_widest_is_named() -> None:
     assert f"a strip {max(widths[1]):.2f} m wide" in " ".join(blind_notes(wide))
 
 
-def test_four_sensors_in_front_are_blind_behind_and_do_not_back() -> None:
-    settings = robot(-30.0, -10.0, 10.0, 30.0)
-    assert blind_sides_deg(settings) == [(43, 317)]
+def test_six_sensors_in_front_are_blind_behind_and_do_not_back() -> None:
+    settings = robot(-50.0, -30.0, -10.0, 10.0, 30.0, 50.0)
+    assert blind_sides_deg(settings) == [(63, 297)]
     sides, back, stand = blind_notes(settings)
-    assert "no sensor looks from 43° to 317°" in sides
-    assert "backwards the robot drives not at all" in back
-    assert "at one place it hears 85° of 360°" in stand
+    assert "no sensor looks from 63° to 297°" in sides
+    assert "the robot never drives backwards" in back
+    assert not any("backwards" in note for note in blind_notes(robot(0.0))), "one that never drives has no dead end"
+    assert "at one place it hears 125° of 360°" in stand
     assert "does not find itself before it has turned or driven, and it recognises an object once" in stand
 
 

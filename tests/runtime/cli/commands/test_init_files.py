@@ -158,7 +158,7 @@ def test_any_number_of_sensors_is_written_and_what_it_cannot_do_is_said(
     assert run_command(["init", "robot", "mine.toml", *words]) == DONE
     said = capsys.readouterr().out
     drives = sensors == 12 or (layout == "in-front" and sensors > 1)
-    assert ("never drives there; of sensors with a beam of ±15° it needs 2 in front" in said) == (not drives)
+    assert ("never drives ahead; of sensors with a beam of ±15° it needs 2 in front" in said) == (not drives)
     assert ("no sensor looks from" in said) == (not (layout == "all-round" and drives))
     assert (pattern_speed_m_s(load_settings("room", robot="mine.toml")) > 0.0) == drives
 
@@ -174,6 +174,7 @@ def test_a_person_sees_what_an_answer_costs_and_keeps_the_answers_when_one_is_re
     asked = capsys.readouterr().err
     assert "every direction within 23° of its way: of sensors with a beam of ±15° it needs 2 in front" in asked
     assert "never drives backwards" in asked
+    assert "a board of one's own, Pico or ESP32" in asked
     assert "a line of 300 baud" in asked
     assert "Once more: Enter keeps an answer." in asked
     assert "Number of sensors [3]: " in asked
