@@ -32,6 +32,7 @@ except ModuleNotFoundError:
 
 from tests import line_coverage
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in `runtime.cli.__main__`, before numpy is imported
 COVERAGE = line_coverage.start()  # before any module of the product is imported
 
 from runtime.support import child_process, kernel_warmup  # noqa: E402
@@ -181,18 +182,18 @@ def _write_coverage(process: int) -> None:
         COVERAGE.write(process)
 
 
-@pytest.fixture(autouse=True)
-def _children_at_usual_priority(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Start children at the priority of the tests: at the low one, a few tests at a time leave them no processor."""
-    if request.path.name != "test_child_process.py":
-        monkeypatch.setattr(child_process, "LOW_PRIORITY", "runpy")
+@pytest.fixture(scope="module", autouse=True)
+def _children_and_kernels(request: pytest.FixtureRequest) -> Generator[None]:
+    """Start children at the priority of the tests: at the low one, a few tests at a time leave them no processor.
 
-
-@pytest.fixture(autouse=True)
-def _kernels_stay_loaded(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Warm up no kernel again: a forked process has them all, and it took a third of the time of commands."""
-    if request.config.option.forks and request.path.name not in WARM_UP_TESTS:
-        monkeypatch.setattr(kernel_warmup, "warm_up", lambda _settings, parts: list(parts))
+    Warm up no kernel again: a forked process has them all, and it took a third of the time of commands.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        if request.path.name != "test_child_process.py":
+            patch.setattr(child_process, "LOW_PRIORITY", "runpy")
+        if request.config.option.forks and request.path.name not in WARM_UP_TESTS:
+            patch.setattr(kernel_warmup, "warm_up", lambda _settings, parts: list(parts))
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)

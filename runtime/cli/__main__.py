@@ -10,11 +10,15 @@ from runtime.cli.first_signals import handle_first_signals
 GARBAGE_MAX = 10_000
 """Objects from one garbage collection to the next: Python's 700 make a thousand collections of a start, which find
 nothing."""
+ARRAY_THREADS = "OPENBLAS_NUM_THREADS"
+"""How many threads numpy multiplies matrices with; it reads this when it is imported. Ours are small: threads spend
+more processor time on waiting for one another than they save, and round as the number of processors has it."""
 
 
 def main() -> None:
     """Run the command line and exit."""
     handle_first_signals()
+    os.environ.setdefault(ARRAY_THREADS, "1")
     import gc
 
     gc.set_threshold(GARBAGE_MAX)

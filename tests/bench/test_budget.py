@@ -36,42 +36,48 @@ def control_us() -> float:
     return 1e3 * float(np.median([control_ms() for _ in range(50)]))
 
 
-def test_each_quantum_and_each_cycle_is_short() -> None:
+@pytest.fixture(scope="module")
+def drive() -> DriveCosts:
+    """Return the costs of a drive whose budget is never spent."""
+    return costs_of_drive(SETTINGS, CYCLES, NEVER_S)
+
+
+def test_each_quantum_and_each_cycle_is_short(drive: DriveCosts) -> None:
     drives: list[DriveCosts] = []
 
     def quanta() -> tuple[list[float], float]:
-        drives.append(costs_of_drive(SETTINGS, CYCLES, NEVER_S))
+        drives.append(costs_of_drive(SETTINGS, CYCLES, NEVER_S) if drives else drive)
         return drives[-1].quanta_us, QUANTUM_MAX * control_us()
 
     assert always_beyond(quanta) == set(), "quanta that take too long every time"
     assert len(drives[0].quanta_us) > 250
     assert {len(drive.quanta_us) for drive in drives} == {len(drives[0].quanta_us)}
-    assert all("budget" not in drive.causes for drive in drives)
+    assert all("budget" not in one.causes for one in drives)
 
     def cycles() -> tuple[list[float], float]:
-        drive = drives.pop() if drives else costs_of_drive(SETTINGS, CYCLES, NEVER_S)
-        return drive.spent_us, CYCLE_MAX * control_us()
+        other = drives.pop() if drives else costs_of_drive(SETTINGS, CYCLES, NEVER_S)
+        return other.spent_us, CYCLE_MAX * control_us()
 
     assert always_beyond(cycles) == set(), "cycles that spend more than the default budget every time"
 
 
-def test_no_quantum_starts_after_the_budget_is_spent() -> None:
+def test_no_quantum_starts_after_the_budget_is_spent(drive: DriveCosts) -> None:
     """Where many cycles end with their budget and many quanta fit into it, those start before it is spent.
 
     The machine's speed may change from drive to drive, so that the budget follows it. Only what is late in each of
     six such drives is the program's fault; a program without a budget has no such drive.
     """
-    budget_us = float(np.median(costs_of_drive(SETTINGS, CYCLES, NEVER_S).started_us))
+    budget_us = float(np.median(drive.started_us))
     late_shares: list[float] = []
     for _ in range(2 * REPETITIONS_MAX):
-        drive = costs_of_drive(SETTINGS, CYCLES, 1e-6 * budget_us)
-        if len(drive.started_us) < QUANTA_MIN:
+        tight = costs_of_drive(SETTINGS, CYCLES, 1e-6 * budget_us)
+        if len(tight.started_us) < QUANTA_MIN:
             budget_us *= 1.5
-        elif drive.causes.get("budget", 0) < CUT_SHORT_MIN:
+        elif tight.causes.get("budget", 0) < CUT_SHORT_MIN:
             budget_us /= 1.5
         else:
-            margin_us = 0.5 * float(np.median(drive.quanta_us))
-            late_shares.append(float(np.mean(np.array(drive.started_us) > budget_us + margin_us)))
+            margin_us = 0.5 * float(np.median(tight.quanta_us))
+            late_shares.append(float(np.mean(np.array(tight.started_us) > budget_us + margin_us)))
             if late_shares[-1] <= LATE_SHARE_MAX or len(late_shares) == REPETITIONS_MAX:
                 break
     assert late_shares, "no drive is cut short by its budget"

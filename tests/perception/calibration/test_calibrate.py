@@ -22,15 +22,6 @@ def errors(seed: int, model: str, drift: float, pace: float) -> CalibrationError
     return calibration_errors(drive, found)
 
 
-@pytest.mark.compiled
-def test_a_quick_drive_finds_mounts_and_scales() -> None:
-    """Limits wider than the slow drive's: a sixth of the readings, 6.6° of turn between two of a sensor."""
-    found = errors(200, "specular", 0.0, 6.0)
-    assert found.angle_deg <= 2.0
-    assert found.place_m <= 0.009
-    assert max(found.distance, found.turn, found.range) <= 0.006
-
-
 @pytest.mark.soak
 @pytest.mark.parametrize("model", ["specular", "cone"])
 def test_a_slow_drive_finds_them_to_a_third_of_a_degree_and_three_millimetres(

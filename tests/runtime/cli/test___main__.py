@@ -10,14 +10,21 @@ from pathlib import Path
 import pytest
 
 from config.errors import DONE, WRONG_CALL
+from runtime.cli.__main__ import ARRAY_THREADS
 from tests.runtime.cli.user_errors import error_lines
 
 ROOT = Path(__file__).parents[3]
-ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
+ENVIRONMENT = {name: value for name, value in os.environ.items() if name != ARRAY_THREADS} | {"PYTHONPATH": str(ROOT)}
 WITHOUT_MATPLOTLIB = """
-import sys, runtime.cycle.process, runtime.recording.recorder
-from runtime.cli.__main__ import main
+import os, sys, runtime.cycle.process, runtime.recording.recorder
+from runtime.cli import app
+from runtime.cli.__main__ import ARRAY_THREADS, main
 assert "matplotlib" not in sys.modules
+run = app.main
+def run_with_one_thread():
+    assert os.environ[ARRAY_THREADS] == "1"
+    run()
+app.main = run_with_one_thread
 sys.argv[1:] = ["check", "hallway"]
 main()
 """
@@ -32,7 +39,7 @@ def test_a_wrong_call_as_a_program() -> None:
     assert len(error_lines(done.stderr)) == 1
 
 
-def test_a_closed_pipe_is_no_traceback_and_a_run_does_not_load_matplotlib() -> None:
+def test_a_closed_pipe_is_no_traceback_and_a_run_loads_neither_matplotlib_nor_threads_for_arrays() -> None:
     """As in `echolocate check hallway | true`. Matplotlib takes half a second to load, and no cycle uses it."""
     read, write = os.pipe()
     os.close(read)
