@@ -24,6 +24,7 @@ from config.world import WorldConfig
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.localization.known_room.known_room import KnownRoom
 from perception.localization.room.room import room_of
+from perception.snapshot import Snapshot, put_back, snapshot_of
 from tests.perception.localization.rooms import RECTANGLE, RING, world_of
 
 pytestmark = pytest.mark.compiled
@@ -49,26 +50,38 @@ class Outcome:
         return any(status == "tracking" and not right for status, right in self.stands + self.drives)
 
 
+def hear(localizer: KnownRoom, firing: Firing) -> None:
+    localizer.observe(firing)
+    while localizer.can_refine:
+        localizer.refine()
+
+
 def named(
-    ring: RingConfig, world: WorldConfig, drive: KnownDrive, seed: int, error: tuple[float, float], before_m: float
+    ring: RingConfig,
+    world: WorldConfig,
+    drive: KnownDrive,
+    seed: int,
+    error: tuple[float, float],
+    at: int,
+    before: Snapshot,
 ) -> Outcome:
-    """Drive, stand, name a place in error (m, °), stand on while each sensor fires three times, and drive on."""
+    """Stand, name a place in error (m, °), stand on while each sensor fires three times, and drive on.
+
+    `before` is what was known after the firing number `at`.
+    """
     localizer, rng = KnownRoom(room_of(world), ring), np.random.default_rng(seed)
-    at = int(np.searchsorted(drive.way_m(), before_m))
+    put_back(localizer, before)
+    localizer.drop_caches()
     rows = list(zip(drive.firings, drive.truth.tolist(), strict=True))
 
     def said(firing: Firing, truth: list[float]) -> tuple[str, bool]:
-        localizer.observe(firing)
-        while localizer.can_refine:
-            localizer.refine()
+        hear(localizer, firing)
         here = localizer.localized()
         off = math.dist((here.pose.x, here.pose.y), truth[:2])
         right = off < RIGHT_M and abs(wrap_angle(here.ring_yaw - truth[2])) < RIGHT_RAD
         status = here.status if here.status != "tracking" or here.probability > SURE else "localizing"
         return status, right
 
-    for firing, truth in rows[: at + 1]:
-        said(firing, truth)
     firing, truth = rows[at]
     away_m, turn_deg, way = *error, rng.uniform(-math.pi, math.pi)
     x, y = truth[0] + away_m * math.cos(way), truth[1] + away_m * math.sin(way)
@@ -101,8 +114,12 @@ def test_a_wrong_place_is_refuted_and_a_right_one_is_never_lost(
             acoustics = ACOUSTICS.model_copy(update={"model": reflection})
             drive = furnished_drive(RINGS[robot], seed, acoustics, length_m=before_m + 3.0)
             world = furnished_room(seed, acoustics).world
+            localizer, at = KnownRoom(room_of(world), RINGS[robot]), int(np.searchsorted(drive.way_m(), before_m))
+            for firing in drive.firings[: at + 1]:
+                hear(localizer, firing)
+            before = snapshot_of(localizer)
             for name, error in ERRORS.items():
-                outcome = named(RINGS[robot], world, drive, seed, error, before_m)
+                outcome = named(RINGS[robot], world, drive, seed, error, at, before)
                 cases, wrong = cases + 1, wrong + outcome.is_wrong
                 found += outcome.drives[-1] == ("tracking", True)
                 if name in {"right", "near"}:
