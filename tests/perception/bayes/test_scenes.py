@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable
 from dataclasses import replace
@@ -28,6 +29,12 @@ SETTINGS = load_settings("hallway", ["perception.method=bayes"])
 BOXES = load_settings("hallway", ["perception.method=bayes"], models=("semicircle", "box"))
 
 
+@functools.cache
+def drives(scene: SceneName, seed: int) -> list[HallOutcome]:
+    """Return the outcomes of a scene, which more than one test looks at."""
+    return run_scene(SETTINGS, scene, seed)
+
+
 def result(outcomes: Iterable[HallOutcome]) -> tuple[int, int, int, list[float]]:
     """Return the number of drums found, of drums there, of false ones, and the errors in feet."""
     outcomes = list(outcomes)
@@ -49,7 +56,7 @@ def result(outcomes: Iterable[HallOutcome]) -> tuple[int, int, int, list[float]]
 def test_drums_are_found_to_a_few_thousandths_of_a_foot(
     scene: SceneName, seeds: tuple[int, ...], there: int, mean: float, worst: float
 ) -> None:
-    found, wanted, false, errors = result(o for seed in seeds for o in run_scene(SETTINGS, scene, seed))
+    found, wanted, false, errors = result(o for seed in seeds for o in drives(scene, seed))
     assert (found, wanted, false) == (there, there, 0)
     assert np.mean(errors) <= mean
     assert max(errors) <= worst
@@ -86,7 +93,7 @@ def test_boxes_are_found_by_their_model() -> None:
 def test_the_first_sure_fix_is_four_feet_before_passing(
     scene: SceneName, seeds: tuple[int, ...], least: float, middle: float, share: float
 ) -> None:
-    fixes = [fix for seed in seeds for o in run_scene(SETTINGS, scene, seed) for fix in o.fixes]
+    fixes = [fix for seed in seeds for o in drives(scene, seed) for fix in o.fixes]
     summary = summarise_fixes(fixes)
     assert len(fixes) >= 6
     assert summary is not None
