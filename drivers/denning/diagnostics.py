@@ -48,6 +48,14 @@ def wrong_robot(ident: Ident, config: RobotConfig) -> str | None:
     return deadman_refused(ident.name, ident.deadman_ms * 1e-3, config.link)
 
 
+def two_robots(ident: Ident) -> str:
+    """Return the message for two robots that answer the same HELLO."""
+    return (
+        f"two robots answer on this line, one of them as '{ident.name}': both would obey each command; disconnect "
+        f"one of them"
+    )
+
+
 def cannot_listen(ident: Ident, listeners: tuple[int, ...]) -> str | None:
     """Return the message for a robot whose sensors cannot listen as the firing pattern asks; None if they can."""
     if not any(listeners) or (ident.version > 1 and ident.capabilities & CAN_LISTEN):

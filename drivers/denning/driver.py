@@ -55,6 +55,7 @@ class DenningDriver(Session[PoseStamper]):
         self._newest = self._version = version  # what to ask for first, and what to ask for now
         self._unit_m = 0.0  # of a count in ECHO2
         self._ident: Ident | None = None
+        self._earlier_boot: int | None = None  # boot number of the robot that answered before the present one
         self._jump: Jump | None = None  # of the clock, for which the robot is being identified
         self._decoder = Decoder("robot", midway=True)
         self._odometry_s = self._last_frame_s = 0.0  # when the last one came
@@ -85,6 +86,7 @@ class DenningDriver(Session[PoseStamper]):
         super().line_opened(run_s)
         self._last_frame_s = run_s
         self._flush_first = True
+        self._earlier_boot = None
         self._drive_acks = CommandAckMonitor()
         self._start_handshake()
 
@@ -297,6 +299,11 @@ class DenningDriver(Session[PoseStamper]):
             return
         self._ident = ident
         known, self._identity = self._identity, identity_of(ident)
+        if known is not None and known.boot_id != ident.boot_id:
+            earlier, self._earlier_boot = self._earlier_boot, known.boot_id
+            if ident.boot_id == earlier:  # no restart brings a boot number back
+                self._go_down(diagnostics.two_robots(ident))
+                return
         self._version, self._unit_m = ident.version, 1e-6 * ident.range_unit_um
         is_known = known is not None and known.traits == self._identity.traits
         if not is_known and (coarse := diagnostics.coarse_ranges(ident, self._config.ring.resolution_m)) is not None:
@@ -314,8 +321,9 @@ class DenningDriver(Session[PoseStamper]):
             self.stamper.break_off()
         self._jump = None
         if answers_hello or restarted:
+            is_first = answers_hello or self._state is not LineState.HANDSHAKE
             self._state = LineState.HANDSHAKE
-            self._queue("PATTERN")
+            self._queue("PATTERN" if is_first else "HELLO")  # a second answer may be another robot's: ask again
 
     def _take_ack(self, ack: Ack) -> None:
         """Go on after a command that was obeyed: that of the PATTERN makes the line READY."""

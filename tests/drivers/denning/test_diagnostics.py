@@ -34,6 +34,32 @@ def test_silence_is_down_and_motion_does_not_resume_by_itself(harness: DriverHar
     assert only(harness.received(), Drive) == []
 
 
+def test_two_robots_that_answer_on_one_line_are_named_until_one_is_alone() -> None:
+    """They are alike but for the numbers of their boots, which no restart brings back."""
+    harness = DriverHarness()
+    harness.open()
+    other = replace(IDENT, boot_id=0xB002)
+    for _ in range(2):
+        assert only(harness.received(), Hello)
+        harness.send(IDENT)
+        harness.send(other)
+    assert harness.state() is LineState.DOWN
+    assert "two robots answer on this line" in (harness.robot.problem or "")
+    harness.run(2.0, t_us=0)
+    assert harness.state() is LineState.READY
+    assert harness.robot.problem is None
+
+
+def test_a_robot_that_restarts_again_and_again_is_one() -> None:
+    harness = DriverHarness()
+    harness.open()
+    for boot_id in range(5):
+        harness.received()
+        harness.send(replace(IDENT, boot_id=boot_id))
+    assert harness.state() is LineState.HANDSHAKE
+    assert harness.robot.problem is None
+
+
 def drive_on(harness: DriverHarness, seconds: float, t_us: int, *, deaf: bool = False, flags: int = 0) -> int:
     """Drive at 20 Hz with a robot that names the DRIVE it took last, but for the time that it is deaf."""
     last = harness.last_drive
