@@ -188,6 +188,50 @@ def compare(
 
 
 @kernel
+def density_if_turned(
+    i: int,
+    turn: float,
+    missed: float,
+    half_angle: float,
+    tolerance: float,
+    reach: float,
+    mounts: Floats,
+    echoes: Records[EchoTrace],
+) -> float:
+    """Return the density of sensor `i`'s newest reading if the ring has been turned; below 0 if none looked there.
+
+    Half of the echoes that are not as expected are near to what the sensor, or one whose beam overlaps with its own,
+    would hear: a wall that the beam grazes changes its range faster, and a stray before led to expect nothing true.
+
+    Parameters
+    ----------
+    i : int
+        The sensor.
+    turn : float
+        The angle, rad; 0 for an honest ring.
+    missed : float
+        The share of an honest sensor's readings that are not as expected.
+    half_angle, tolerance, reach, mounts, echoes
+        As for `weigh_changes`.
+    """
+    r, k = echoes[i].latest.range_m, source(i, turn, half_angle, echoes)
+    if k < 0:
+        return -1.0
+    low, high = expect(k, i, turn, half_angle, tolerance, mounts, echoes)
+    likely = density(r, low, high, reach, missed)
+    if r < 0.0 or (high >= 0.0 and low <= r <= high):
+        return likely
+    near = 0.0
+    for k in range(len(echoes)):
+        if echoes[k].is_compared:
+            off = abs(wrapped(echoes[k].before.axis - echoes[i].latest.axis - turn))
+            low, high = expect(k, i, turn, half_angle, tolerance, mounts, echoes)
+            if off < 2.0 * half_angle and high >= 0.0 and 2.0 * low - high <= r <= 2.0 * high - low:
+                near = max(near, 1.0 / (3.0 * (high - low)))
+    return 0.5 * likely * (1.0 + near * reach)
+
+
+@kernel
 def weigh_exchange(
     turn: float,
     half_angle: float,
@@ -198,6 +242,8 @@ def weigh_exchange(
     expected: Records[Expected],
 ) -> float:
     """Return the evidence that each sensor hears what was at an angle `turn` from it before, nat.
+
+    A sensor of which that is not known speaks only against it: it should hardly hear what an honest one would.
 
     Parameters
     ----------
@@ -210,11 +256,12 @@ def weigh_exchange(
     for i in range(len(echoes)):
         if expected[i].source < 0:
             continue
-        other = source(i, turn, half_angle, echoes)
-        if other >= 0:
-            low, high = expect(other, i, turn, half_angle, tolerance, mounts, echoes)
-            likely = density(echoes[i].latest.range_m, low, high, reach, expected[i].missed)
-            evidence += math.log(likely) - expected[i].honest_nat
+        missed = expected[i].missed
+        honest = density_if_turned(i, 0.0, missed, half_angle, tolerance, reach, mounts, echoes)
+        likely = density_if_turned(i, turn, missed, half_angle, tolerance, reach, mounts, echoes)
+        if likely < 0.0:
+            likely = min(honest, 0.5 if echoes[i].latest.range_m < 0.0 else 0.5 / reach)
+        evidence += math.log(likely / honest)
     return evidence
 
 

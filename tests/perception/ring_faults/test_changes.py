@@ -16,6 +16,7 @@ from perception.ring_faults.changes import (
     ROUND_M,
     Expected,
     density,
+    density_if_turned,
     expect,
     source,
     weigh_changes,
@@ -76,6 +77,44 @@ def test_what_another_sensor_heard_before_is_found(part: int) -> None:
     change, nats = weighed(looks(ROOM, np.roll(ROOM, -part)))
     assert change == EXCHANGED
     assert nats > ENOUGH_NAT
+
+
+def exchanged_but(kept: Floats) -> Records[EchoTrace]:
+    """Return looks in which most sensors hear what the opposite ones heard; 5 to 7, opposite to none, hear `kept`."""
+    latest = np.roll(ROOM, -8)
+    latest[5:8] = kept
+    echoes = looks(ROOM, latest)
+    for k in range(13, 16):
+        echoes[k].is_compared = 0
+    return echoes
+
+
+def test_sensors_that_hear_as_before_speak_against_a_turn_also_where_none_looked_before() -> None:
+    """A hobby8 has none opposite to some, and an honest one in an office was stopped: its others did not count."""
+    says_nothing = weighed(exchanged_but(np.array([4.9, 4.9, 4.9])))
+    assert says_nothing[0] == EXCHANGED
+    as_before = weighed(exchanged_but(moved(ROOM)[5:8]))
+    assert as_before[1] < says_nothing[1] - 6.0
+
+
+def test_an_honest_sensor_that_misses_hears_what_is_near_or_stood_beside() -> None:
+    """A wall that the beam grazes comes nearer faster; a stray before leads to expect nothing true."""
+    spacing = math.tau / COUNT
+
+    def likely(r: float, half: float) -> float:
+        latest = ROOM.copy()
+        latest[4] = r
+        echoes = looks(ROOM, latest, 0.0)
+        return density_if_turned(4, 0.0, MISSED, half, TOLERANCE, REACH, MOUNTS, echoes)
+
+    low, high = expect(4, 4, 0.0, HALF, TOLERANCE, MOUNTS, looks(ROOM, ROOM, 0.0))
+    chance = 0.25 * MISSED / REACH
+    assert likely(4.9, HALF) == pytest.approx(chance)
+    assert likely(high + 0.5 * (high - low), HALF) > 2.0 * chance
+    assert likely(ROOM[5], 0.4 * spacing) == pytest.approx(chance)
+    assert likely(ROOM[5], 0.6 * spacing) > 2.0 * chance, "beams overlap"
+    assert likely(0.5 * (low + high), HALF) == density(0.5 * (low + high), low, high, REACH, MISSED)
+    assert likely(math.inf, HALF) == density(NO_ECHO_M, low, high, REACH, MISSED)
 
 
 def test_a_robot_that_turns_hears_in_a_sensor_what_another_one_heard() -> None:
