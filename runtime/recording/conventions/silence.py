@@ -24,16 +24,25 @@ MODE_SHARE: Final = 0.05
 """Least share of the ranges that are silence …"""
 TOP_SHARE: Final = 0.01
 """… and where nothing else is near or above."""
-GLITCHES: Final = 0.005
+GLITCHES: Final = 0.03
 """Share of the ranges that may lie above those of silence."""
-BAND: Final = 0.06
+FEW_GLITCHES: Final = 0.005
+"""The same where silence itself may be as rare as `TOP_SHARE`."""
+NOISY_SHARE: Final = 0.02
+"""A value of silence has noise if those beside it are more than this share of it."""
+BAND: Final = 0.12
 """Half width of a noisy band, as a share of its value."""
 BAND_CONTRAST: Final = 5.0
 """How many times as dense as below it the ranges in the band are."""
+DOUBTFUL: Final = (0.2, 3.0)
+"""Half width and contrast of a band that may be silence: the log is refused unless it is said what it is."""
 WIDTHS: Final = 4.5
 """Half width within which a band is looked for, in its standard deviations; beyond it are 7 of a million values."""
 LEAST_SPREAD: Final = 1e-3 / WIDTHS
 """Least standard deviation of a band, as a share of its value: for what is rounded."""
+LEAST_STEPS: Final = 0.02
+"""Ranges are rounded to steps of no more than this share of what stands for silence."""
+TAKEN: Final = ", which is taken for silence (inf)"
 RANGES_MIN: Final = 100
 LEAP: Final = 1.25
 """A leap is a range longer than those before and after it by this factor."""
@@ -108,7 +117,8 @@ def find_silence(table: Table, wanted: str, set_size: int) -> Silence:
     if wanted == "inf" or len(finite) == 0:
         return Silence()
     if wanted == "max":
-        return _top(finite) or _spikes(ranges) or Silence(float(finite.max()), np.inf, is_top=True, option="max")
+        found = _top(finite) or _spikes(ranges) or _band(finite, GLITCHES, *DOUBTFUL)
+        return found or Silence(float(finite.max()), np.inf, is_top=True, option="max")
     negative = np.unique(finite[finite < 0.0])
     if len(negative):
         if len(negative) > 1 or np.isposinf(ranges).any():
@@ -122,8 +132,21 @@ def find_silence(table: Table, wanted: str, set_size: int) -> Silence:
         return Silence()
     zeros = int(np.count_nonzero(finite == 0.0))
     if zeros > TOP_SHARE * len(finite):
+        _check_zeros(ranges[table.moved], finite)
         return _one_value(0.0, finite)
     return _most_frequent(ranges[table.moved], finite)
+
+
+def _check_zeros(moved: Floats, finite: Floats) -> None:
+    """Raise an error if another value stands for silence more often than 0; parameters as of `_most_frequent`."""
+    other = _most_frequent(np.where(moved == 0.0, np.nan, moved), finite[finite > 0.0])
+    zeros, silent = (finite == 0.0).mean(), ((finite >= other.low) & (finite <= other.high)).mean()
+    if silent > zeros:
+        raise RingLogError(
+            f"{100 * zeros:.2g} % of the ranges are 0, and {100 * silent:.0f} % are {other.low:.4g} to "
+            f"{other.high:.4g} wherever the robot is: say --silence {other.option} --not-fired 0 if 0 is no reading, "
+            "or --silence 0 if only that is no echo"
+        )
 
 
 def _most_frequent(moved: Floats, finite: Floats) -> Silence:
@@ -141,8 +164,18 @@ def _most_frequent(moved: Floats, finite: Floats) -> Silence:
     most = int(counts.argmax())
     second = int(np.delete(counts, most).max(initial=1))
     if counts[most] > max(MODE_FACTOR * second, MODE_SHARE * len(finite_moved)):
-        return _one_value(float(values[most]), finite)
-    return _top(finite_moved) or _spikes(moved) or Silence()
+        value, band = float(values[most]), _top(finite_moved)
+        if band is None or not band.low <= value <= band.high:
+            return _one_value(value, finite)
+        inside = np.count_nonzero((finite_moved >= band.low) & (finite_moved <= band.high))
+        return band if inside > (1.0 + NOISY_SHARE) * counts[most] else _one_value(value, finite)
+    found = _top(finite_moved) or _spikes(moved)
+    if found is None and (wide := _band(finite_moved, GLITCHES, *DOUBTFUL)) is not None:
+        raise RingLogError(
+            f"{wide.words.removesuffix(TAKEN)}: say --silence max if that is no echo, or --silence inf if they are "
+            "ranges"
+        )
+    return found or Silence()
 
 
 def check_near(ranges: Floats, unit_m: float, range_min_m: float, silence: str) -> None:
@@ -196,25 +229,51 @@ def _one_value(value: float, finite: Floats) -> Silence:
         value,
         is_top=is_top,
         option=f"{value:.10g}",
-        words=f"{100 * share:.0f} % of the ranges are exactly {value:g}, which is taken for silence (inf)",
+        words=f"{100 * share:.0f} % of the ranges are exactly {value:g}{TAKEN}",
     )
 
 
 def _top(finite: Floats) -> Silence | None:
     """Return a narrow band at the top of the ranges, if there is one."""
-    centre = float(np.quantile(finite, max(0.0, 1.0 - max(GLITCHES, 3.0 / len(finite)))))
+    return _band(finite, FEW_GLITCHES) or _band(finite, GLITCHES)
+
+
+def _band(finite: Floats, glitches: float, widest: float = BAND, contrast: float = BAND_CONTRAST) -> Silence | None:
+    """Return a band of ranges, of which a share is above, as silence, if there is one.
+
+    Parameters
+    ----------
+    finite : (n,) float
+        Ranges.
+    glitches : float
+        The share.
+    widest : float
+        Half width of the band at most, as a share of its value.
+    contrast : float
+        How many times as dense as below it the ranges in it are at least.
+    """
+    centre = float(np.quantile(finite, max(0.0, 1.0 - max(glitches, 3.0 / len(finite)))))
     for _ in range(5):
-        near = finite[np.abs(finite - centre) <= BAND * centre]
+        near = finite[np.abs(finite - centre) <= widest * centre]
         centre = float(np.median(near))
-    width = WIDTHS * max(1.4826 * float(np.median(np.abs(near - centre))), LEAST_SPREAD * centre)
-    if width > BAND * centre:
+    spread = _spread(near)
+    width = WIDTHS * spread
+    if width > widest * centre:
         return None
     inside = int(np.count_nonzero(np.abs(finite - centre) <= width))
     below = int(np.count_nonzero((finite < centre - width) & (finite >= centre - 5.0 * width)))
-    least = BAND_CONTRAST * (1 + below / 2.0)
+    least = contrast * (1 + below / 2.0)
     if inside < max(least, TOP_SHARE * len(finite), 10):
         return None
-    return _noisy_silence(finite, centre, width / WIDTHS, inside)
+    return _noisy_silence(finite, centre, spread, inside)
+
+
+def _spread(near: Floats) -> float:
+    """Return the standard deviation of values about their median, at least half the step between them."""
+    centre, steps = float(np.median(near)), np.diff(np.unique(near))
+    step = float(steps[steps > LEAST_SPREAD * centre].min(initial=centre))
+    least = 0.5 * step if step < LEAST_STEPS * centre else LEAST_SPREAD * centre
+    return max(1.4826 * float(np.median(np.abs(near - centre))), least)
 
 
 def _spikes(ranges: Floats) -> Silence | None:
@@ -239,8 +298,7 @@ def _spikes(ranges: Floats) -> Silence | None:
     end = np.searchsorted(leaps, leaps * (1.0 + BAND), side="right")
     first = int((end - np.arange(len(leaps))).argmax())
     inside = leaps[first : end[first]]
-    centre, spread = float(np.median(inside)), 1.4826 * float(np.median(np.abs(inside - np.median(inside))))
-    spread = max(spread, LEAST_SPREAD * centre)
+    centre, spread = float(np.median(inside)), _spread(inside)
     above = np.count_nonzero(leaps > centre + WIDTHS * spread)
     if len(inside) < max(LEAPS_MIN, LEAPS_SHARE * len(leaps)) or above > GLITCHES * ranges.size:
         return None
@@ -272,4 +330,4 @@ def _noisy_silence(finite: Floats, centre: float, spread: float, count: int) -> 
     low, high = ends
     share = np.count_nonzero((finite >= low) & (finite <= high)) / len(finite)
     words = f"{100 * share:.0f} % of the ranges are {centre:.4g} ± {spread:.1g} wherever the robot is"
-    return Silence(low, high, is_top=True, words=f"{words}, which is taken for silence (inf)", option="max")
+    return Silence(low, high, is_top=True, words=f"{words}{TAKEN}", option="max")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from drivers.messages import Floats
 from runtime.recording.conventions.silence import find_silence
 from runtime.recording.conventions.table import Table
+from runtime.recording.ring_log import RingLogError
 
 ROWS, SENSORS = 600, 4
 
@@ -85,3 +86,38 @@ def test_a_noisy_band_among_ranges_takes_few_of_them(wanted: str) -> None:
     away = np.abs(rows.ranges - 7.6)
     least = min(int(((away <= half) != is_silent).sum()) for half in np.linspace(0.01, 0.3, 30))
     assert (got != is_silent).sum() < 1.15 * least
+
+
+@pytest.mark.parametrize("spread", [0.003, 0.006, 0.15])
+def test_a_ceiling_with_noise_and_glitches_above_it_is_found(spread: float) -> None:
+    """With noise of one last digit most values are the same; a wide band, and one with glitches, were not found."""
+    rng = np.random.default_rng(4)
+    ceiling = np.round(7.6 + spread * rng.standard_normal(1000), 2)
+    ceiling[:30] = np.round(rng.uniform(9.0, 30.0, 30), 2)
+    rows, is_silent = table(rng.permutation(ceiling), 0.6)
+    rows.ranges[:] = np.round(rows.ranges, 2)
+    found = find_silence(rows, "auto", 1)
+    got, is_glitch = np.isposinf(found.applied(rows.ranges)), rows.ranges > 9.0
+    assert found.option == "max"
+    assert got[is_silent & ~is_glitch].mean() > 0.995
+    assert not got[~is_silent].any()
+
+
+def test_glitches_of_zero_below_a_ceiling_are_refused_with_the_options_that_keep_both_apart() -> None:
+    rows, _ = table(np.concatenate([NOISY, np.zeros(40)]), 0.6)
+    with pytest.raises(RingLogError, match=r"are 0, and .*: say --silence max --not-fired 0 if 0 is no reading"):
+        find_silence(rows, "auto", 1)
+    assert find_silence(rows, "0", 1).applied(rows.ranges).max() == np.inf
+    few, _ = table(np.concatenate([NOISY[:300], np.zeros(700)]), 0.6)
+    assert find_silence(few, "auto", 1).option == "0", "more than those at the top"
+
+
+def test_a_ceiling_with_more_noise_than_surfaces_have_is_refused_with_the_option() -> None:
+    rows, is_silent = table(np.array([1.0]), 0.0)
+    is_silent[: 4 * ROWS // 5] = True  # no leaps
+    rows.ranges[is_silent] = 7.6 + 0.3 * np.random.default_rng(5).standard_normal(int(is_silent.sum()))
+    with pytest.raises(
+        RingLogError, match="say --silence max if that is no echo, or --silence inf if they are ranges"
+    ):
+        find_silence(rows, "auto", 1)
+    assert (np.isposinf(find_silence(rows, "max", 1).applied(rows.ranges)) == is_silent).mean() > 0.99
