@@ -12,7 +12,8 @@ LIMITS: Sequence[str] = (
     "Ranges that have been too long, or too short, by the same length since the ring's first readings, or that "
     "become so where the ring hears few echoes at that moment (three to eight: in 11 of 32 drives of rings of "
     "8, 16 and 24 sensors among mirrors something was touched when ranges became too long, in 0 of 16 when "
-    "they became too short; through rooms, offices and corridors in 27 of 146, and in 0 of 27): they "
+    "they became too short; through rooms, offices and corridors in 27 of 146, and in 0 of 27; "
+    "14 of those 146 were not named): they "
     "change as the robot's motion says. "
     "A map of the room contradicts them; without one, only a bumper stops the robot.",
     "A ring that hears nothing from its first reading on: the robot creeps at 0.04 m/s, says why, and is stopped "
@@ -23,8 +24,9 @@ LIMITS: Sequence[str] = (
     "named after a metre or two on which its neighbours change, and what stood ahead may be touched before. Half of "
     "the ring that freezes is named after 0.3 to 6 s (30 of 30 drives), but one by one, from its edge: where no "
     "neighbour changes, sensors are believed, and in 6 of 30 drives something was touched, at up to 0.3 m/s, after 5 "
-    "to 19 s (ahead alone: in 6 of 122). Where all that looks ahead falls silent, what other sensors heard in the "
-    "last 30 s limits the speed, and what none has heard does not: in 14 of 128 drives something was touched. Where "
+    "to 19 s (ahead alone: in 6 of 122, and in 2 of 76 that went on for half a metre nothing was said). Where all "
+    "that looks ahead falls silent, what other sensors heard in the last 30 s limits the speed, and what none has "
+    "heard does not: in 14 of 128 drives something was touched, and in 17 of 73 nothing was said. Where "
     "nine of ten readings of every sensor are reported as silence, as of a mirror, it was so in 7 of 124; most are "
     "named before.",
     "Sensors that do not hear what is near, where they have heard nothing of it from farther away: a wall along "
