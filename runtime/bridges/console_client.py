@@ -39,6 +39,8 @@ SILENCE_MAX_S: Final = 10.0
 CONNECT_MAX_S: Final = 5.0
 KEPT_MAX: Final = 256
 """Messages that may wait to be taken."""
+RUN_OVER: Final = "the run is over"
+"""How a connection ends that the run itself has closed."""
 RETRY_FIRST_S: Final = 0.25
 RETRY_MAX_S: Final = 2.0
 """Waits between attempts to connect; each is twice the one before."""
@@ -144,7 +146,7 @@ class ConsoleClient:
                 message = await self._socket.receive(timeout=SILENCE_MAX_S)
                 if message.type is not aiohttp.WSMsgType.TEXT:
                     if self._socket.close_code == aiohttp.WSCloseCode.GOING_AWAY:
-                        reason = "the run is over"
+                        reason = RUN_OVER
                     return
                 self._take(orjson.loads(message.data))
         except TimeoutError:

@@ -14,7 +14,7 @@ from typing import Final, Literal, TypeAlias, TypedDict
 from urllib.parse import urlsplit
 
 from config.errors import UserError
-from runtime.bridges.console_client import RETRY_MAX_S, ConsoleClient, ConsoleError, Message, connect
+from runtime.bridges.console_client import RETRY_MAX_S, RUN_OVER, ConsoleClient, ConsoleError, Message, connect
 
 CONFIRM_MAX_S: Final = 0.7
 """A HALT that is not confirmed after this time is unconfirmed, s: the page, which asks five times a second, shows it
@@ -53,6 +53,8 @@ class FleetRun:
     """The start URL, with the token."""
     is_local: bool
     client: ConsoleClient | None = None
+    is_over: bool = False
+    """Whether it has said that it ends."""
     problem: str = "connecting"
     """Why there is no connection; empty while there is one."""
     state: Message = field(default_factory=dict)
@@ -125,7 +127,10 @@ class Fleet:
         return [_row(run, now_s) for run in self.runs]
 
     async def watch_local(self) -> None:
-        """Follow every run of this machine, until cancelled; one that has ended leaves the list."""
+        """Follow every run of this machine, until cancelled; one that has ended leaves the list.
+
+        One that is gone without a word, as when it was killed, stays until the operator removes it.
+        """
         while True:
             try:
                 urls = set(await asyncio.to_thread(lambda: list(self._find_local())))
@@ -134,7 +139,9 @@ class Fleet:
             for url in sorted(urls):
                 self.add(url, is_local=True)
             for run in [run for run in self.runs if run.is_local and run.url not in urls and run.client is None]:
-                self.remove(run.address)
+                if run.is_over or not run.state:
+                    self.remove(run.address)
+                run.is_local = False
             await asyncio.sleep(LOOK_S)
 
     async def close(self) -> None:
@@ -174,6 +181,7 @@ class Fleet:
                             run.state, run.state_s = message, self._clock()
             except ConsoleError as error:
                 run.problem = str(error)
+                run.is_over = run.is_over or run.problem == RUN_OVER
             finally:
                 run.client = None
             await asyncio.sleep(RETRY_MAX_S / 2.0)
@@ -181,6 +189,8 @@ class Fleet:
 
 def _judge_halt(run: FleetRun, now_s: float) -> None:
     """Take a HALT as confirmed once a state after its answer shows that the run does not drive."""
+    if run.halt == "confirmed" and run.state.get("mode") == "DRIVE":
+        run.halt = "none"  # it was armed again
     if run.halt not in {"sent", "unconfirmed"}:
         return
     if run.state_s >= run.answered_s and run.state.get("mode") != "DRIVE":

@@ -139,6 +139,10 @@ class EvidenceGrid:
         self.method.observe(firing, self.bearings, self.place, self.silence_m)
         self.sight_lines.observe(firing, self.bearings, self.place, self.method.holding())
         self._firings += 1
+        self.know_slanting(slanting)
+
+    def know_slanting(self, slanting: int) -> None:
+        """Take over what is known of slanting walls, as of `perception.method.Method.locate_echoes`."""
         if slanting != 0:
             self._are_mirrors = slanting < 0
 

@@ -168,6 +168,7 @@ def run_evidence(
         firing = Firing(scan.t_s, Pose(scan.x, scan.y, theta), scan.yaw, ranges)
         grid.observe(firing)
         entered.append((firing, grid.bearings.copy(), grid.place))
+    grid.know_slanting(slanting_answers(world, echoes, ring))
     x_m, y_m = (CELL_M * float(number) for number in grid.window.corner)
     occupied = grid.method.probability(None)
     holds = occupied > EVEN
@@ -194,12 +195,58 @@ def explained_bearings(world: WorldConfig, rows: Echoes, half_angle: float) -> F
         feet = start + np.outer(np.where((along >= 0.0) & (along <= 1.0), along, np.nan), chord)
         contacts.append((feet - at, 0.0))
     for towards, radius_m in contacts:
-        off = np.mod(np.arctan2(towards[:, 1], towards[:, 0]) - rows["bearing"] + math.pi, 2.0 * math.pi) - math.pi
+        off = _turned(np.arctan2(towards[:, 1], towards[:, 0]) - rows["bearing"])
         with np.errstate(invalid="ignore"):
             error = np.abs(rows["range_m"] - np.hypot(towards[:, 0], towards[:, 1]) + radius_m)
             better = (error < best) & (np.abs(off) <= half_angle)
         best[better], found[better] = error[better], off[better]
     return found
+
+
+def slanting_answers(world: WorldConfig, echoes: Echoes, ring: RingConfig) -> int:
+    """Return what a run's readings show of slanting walls, as `perception.method.Method.locate_echoes` has it.
+
+    A wall whose foot lies outside the beam may answer from the beam's edge. Readings that nothing else explains show
+    whether it does.
+    """
+    from perception.bayes.walls.contact import (
+        EDGES_LEAD,
+        EDGES_SHARE,
+        END_MARGIN_M,
+        MIRRORS_SILENCES,
+        SLANTING_MIN_COS,
+        WENT_ON_M,
+    )
+
+    half_angle = math.radians(ring.beam_half_angle_deg)
+    rows = echoes[np.isnan(explained_bearings(world, echoes, half_angle))]
+    heard = silent = 0
+    for x1, y1, x2, y2 in itertools.chain.from_iterable(wall.pieces_m() for wall in world.wall):
+        length = math.hypot(x2 - x1, y2 - y1)
+        tx, ty = (x2 - x1) / max(1e-9, length), (y2 - y1) / max(1e-9, length)
+        dx, dy = x1 - rows["x"], y1 - rows["y"]
+        across = dy * tx - dx * ty  # to the line, positive along its normal (-ty, tx)
+        side = np.where(across < 0.0, -1.0, 1.0)
+        off = _turned(np.arctan2(side * tx, -side * ty) - rows["bearing"])
+        beyond = np.abs(off) - half_angle  # from the beam's edge to the foot
+        edge = rows["bearing"] + np.copysign(half_angle, off)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            expected = np.abs(across) / np.cos(beyond)
+            along = expected * (np.cos(edge) * tx + np.sin(edge) * ty) - dx * tx - dy * ty
+            meets = (beyond > 0.0) & (np.cos(beyond) > SLANTING_MIN_COS) & (expected < ring.range_max_m)
+            meets &= (along > END_MARGIN_M) & (along < length - END_MARGIN_M)
+            error = rows["range_m"] - expected
+        heard += int((meets & (np.abs(error) < EXPLAINED_M)).sum())
+        silent += int((meets & (error > EXPLAINED_M + WENT_ON_M)).sum())
+    if heard > EDGES_SHARE * silent + EDGES_LEAD:
+        return 1
+    return -1 if silent >= MIRRORS_SILENCES else 0
+
+
+def _turned(angles: Floats) -> Floats:
+    """Return angles from -π to π."""
+    turned: Floats = np.mod(angles + math.pi, 2.0 * math.pi) - math.pi
+    return turned
 
 
 def _pixels_of(window: OccupancyWindow, low: Floats, rows: int, columns: int) -> NDArray[np.float32]:

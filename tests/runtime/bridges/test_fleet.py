@@ -52,6 +52,8 @@ def test_a_halt_is_confirmed_by_the_answer_and_a_state_after_it() -> None:
         await shows(case, fleet, "halt", "unconfirmed")
         case.run.state.mode = ModeState(Mode.SAFE_STOP)
         await shows(case, fleet, "halt", "confirmed")
+        case.run.state.mode = ModeState(Mode.DRIVE)  # armed again: an earlier HALT says nothing
+        await shows(case, fleet, "halt", "none")
 
     with_fleet(body)
 
@@ -126,7 +128,12 @@ def test_runs_of_this_machine_come_and_go() -> None:
         watching = asyncio.create_task(fleet.watch_local())
         while not fleet.runs:
             await asyncio.sleep(0.01)
+        fleet.runs[0].state = {"mode": "DRIVE", "flags": [], "pose": [0.0, 0.0, 0.0]}
         found.clear()
+        while fleet.runs[0].is_local:  # killed: the robot may be without a program
+            await asyncio.sleep(0.01)
+        assert [row["address"] for row in fleet.rows()] == ["127.0.0.1:1"]
+        fleet.runs[0].is_local = fleet.runs[0].is_over = True
         while fleet.runs:
             await asyncio.sleep(0.01)
         watching.cancel()

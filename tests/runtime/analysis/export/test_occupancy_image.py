@@ -20,6 +20,7 @@ from runtime.analysis.export.occupancy_image import (
     OccupancyImage,
     explained_bearings,
     occupancy_image,
+    slanting_answers,
     world_outlines,
 )
 from runtime.analysis.timeline import ECHO, Echoes
@@ -94,6 +95,17 @@ def test_an_echo_that_something_recognised_explains_marks_its_contact_only() -> 
     assert explained_bearings(wall, rows, HALF_ANGLE_RAD)[0] == pytest.approx(-0.1)
     ended = WorldConfig(wall=(WallConfig(x1_m=2.0, y1_m=0.5, x2_m=2.0, y2_m=1.0),))
     assert np.isnan(explained_bearings(ended, rows, HALF_ANGLE_RAD)).all()
+
+
+def test_silent_beams_on_slanting_walls_show_mirrors() -> None:
+    wall = WorldConfig(wall=(WallConfig(x1_m=2.0, y1_m=-3.0, x2_m=2.0, y2_m=3.0),))
+    answer_m = 2.0 / math.cos(0.5 - HALF_ANGLE_RAD)
+    silent = math.inf
+    for ranges_m, shown in ((19 * (silent,), 0), (20 * (silent,), -1), (9 * (answer_m,), 1), (30 * (1.0,), 0)):
+        for bearing in (-0.5, 0.5):
+            assert slanting_answers(wall, readings(*ranges_m, bearing=bearing), RING) == shown
+    for bearing in (0.1, 1.2, 2.0):  # the foot is in the beam, the edge meets the wall's end, or no wall
+        assert slanting_answers(wall, readings(*30 * (silent,), bearing=bearing), RING) == 0
 
 
 def test_what_was_recognised_is_occupied_wherever_sound_has_passed() -> None:
