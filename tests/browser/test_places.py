@@ -97,7 +97,7 @@ async def operate(case: ConsoleCase, opener: Opener, folder: Path) -> None:
     await page.locator("#places-speed").fill("0.1")
     await page.locator("#places-name").fill("ward")
     await page.locator("#places-name").press("Enter")
-    await until_row(opened, "ward at most 0.1 m/s")
+    await until_row(opened, "ward at most 0.10 m/s")
     await page.locator("#places-kind").select_option("place")
     await drag(opened, (3.0, 0.0), (3.0, 0.8))
     await expect(page.locator("#places-name")).to_have_value("place-1")  # the run's answer fills the form

@@ -60,7 +60,7 @@ export class Buttons {
         const found = actions.find((one) => one.key === action);
         const name = found?.name ?? action.slice(action.indexOf(":") + 1);
         const content = [el("span", {}, name), key ? el("kbd", {}, key.toUpperCase()) : null];
-        const title = found ? `${found.kind} ${name}` : "not there now";
+        const title = found ? `${found.kind} ${name}` : "not available now";
         const disabled = !enabled || found === undefined;
         return button(content, () => this.#act(action), { "data-action": action, title, disabled });
       }),
@@ -100,7 +100,7 @@ export class Buttons {
     setText(
       byId("button-error"),
       action === ""
-        ? "there is nothing to make a button of"
+        ? "there is no mission or place for a button yet"
         : taken === undefined
           ? ""
           : `the key ${key.toUpperCase()} belongs to ${taken}: choose another`,

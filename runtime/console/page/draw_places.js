@@ -31,7 +31,8 @@ export function drawPlaces(f) {
     ctx.setLineDash([6, 4]);
     stroke(ctx, isSelected("speed_area", i) ? 3 : 1.5);
     ctx.setLineDash([]);
-    label(f, points, `${row.name ? `${row.name} ` : ""}≤ ${row.speed_max_m_s} m/s`, theme.warning);
+    const limit = `≤ ${f.units.number(row.speed_max_m_s)} ${f.units.name}/s`;
+    label(f, points, `${row.name ? `${row.name} ` : ""}${limit}`, theme.warning);
   }
   for (const [i, row] of places.all.no_go_area.entries()) {
     const points = onScreen(row);
@@ -75,8 +76,10 @@ function drawPlace(f, places, row, isSelected) {
   stroke(ctx, 2);
   ctx.font = f.theme.font(12, 650);
   ctx.textAlign = "center";
-  ctx.textBaseline = "bottom";
-  textWithHalo(f, row.name, sx, sy - PIN_PX - 2, theme.drive);
+  // Below it, where the flag of a goal is not, unless its heading points there.
+  const side = heading !== null && Math.sin(heading) < -0.3 ? -1 : 1;
+  ctx.textBaseline = side < 0 ? "bottom" : "top";
+  textWithHalo(f, row.name, sx, sy + side * (PIN_PX + 2), theme.drive);
 }
 
 /** @param {CanvasRenderingContext2D} ctx @param {Pair[]} points @param {boolean} isClosed */

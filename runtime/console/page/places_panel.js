@@ -48,7 +48,7 @@ export class PlacesPanel extends Panel {
         { id: `places-${id}-field` },
         `${name} `,
         el("input", { id: `places-${id}`, class: "number", inputmode: "decimal", autocomplete: "off", ...how }),
-        unit,
+        el("span", { id: `places-${id}-unit` }, unit),
       );
     byId("places").append(
       el("h3", {}, "Places and no-go areas"),
@@ -73,7 +73,7 @@ export class PlacesPanel extends Panel {
         field("x", "x"),
         field("y", "y"),
         field("heading", "heading", "°", { placeholder: "any" }),
-        field("speed", "at most", "m/s"),
+        field("speed", "at most"),
         el("button", { type: "submit", class: "control" }, "Set"),
       ),
       el(
@@ -143,7 +143,7 @@ export class PlacesPanel extends Panel {
     const { places, tool, run } = this;
     const where =
       places.all.frame === "map"
-        ? "They lie in the map."
+        ? `They lie in the map${places.frameIsKnown ? "" : ", where the robot does not know its place: say where it is first"}.`
         : "There is no map: they lie in the odometry of this run, and the next run does not know them.";
     const limits = KIND_NAMES.some((kind) => kind !== "place" && places.all[kind].length > 0);
     if (limits && !places.frameIsKnown && run.session)
@@ -163,7 +163,7 @@ export class PlacesPanel extends Panel {
       "x_m" in row
         ? `${this.units.place(row.x_m, row.y_m)}${row.heading_deg === null ? "" : `, ${row.heading_deg}°`}`
         : "speed_max_m_s" in row
-          ? `at most ${row.speed_max_m_s} m/s`
+          ? `at most ${this.units.number(row.speed_max_m_s)} ${this.units.name}/s`
           : `${row.name ? `${KINDS[kind]}, ` : ""}${cornersOf(row).length} corners`;
     const choose = button([el("strong", {}, name), ` ${what}`], () => places.select(isSelected ? null : [kind, i]), {
       class: "place",
@@ -194,7 +194,8 @@ export class PlacesPanel extends Panel {
         y: units.number(row.y_m),
         heading: row.heading_deg === null ? "" : String(row.heading_deg),
       });
-    if ("speed_max_m_s" in row) given.speed = String(row.speed_max_m_s);
+    if ("speed_max_m_s" in row) given.speed = units.number(row.speed_max_m_s);
+    setText(byId("places-speed-unit"), `${units.name}/s`);
     for (const id of FIELDS) {
       byId(`places-${id}-field`).hidden = !(id in given);
       byId(`places-${id}`).value = given[id] ?? "";
@@ -212,7 +213,8 @@ export class PlacesPanel extends Panel {
       row.y_m = this.units.parse(byId("places-y").value, row.y_m) ?? Number.NaN;
       row.heading_deg = numberIn(byId("places-heading").value);
     }
-    if ("speed_max_m_s" in row) row.speed_max_m_s = numberIn(byId("places-speed").value) ?? 0;
+    if ("speed_max_m_s" in row)
+      row.speed_max_m_s = this.units.parse(byId("places-speed").value, row.speed_max_m_s) ?? Number.NaN;
     if (Object.values(row).some((one) => typeof one === "number" && !Number.isFinite(one)))
       return setText(byId("places-error"), "numbers are wanted here");
     if (kind === "place" && !/^[a-z0-9][a-z0-9_-]{0,39}$/.test(row.name))

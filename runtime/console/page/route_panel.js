@@ -133,10 +133,14 @@ export class RoutePanel extends Panel {
         this.route.load(waypoints, frame);
         if (!this.route.isDriven) byId("route-name").value = name;
       } else {
-        this.notifications.confirm(`Start the mission ${name}?`, el("p", {}, about || "It is more than a route."), [
-          ["Leave it", null],
-          ["Start it", () => void this.ask({ type: "run_mission", toml })],
-        ]);
+        this.notifications.confirm(
+          `Start the mission ${name}?`,
+          el("p", {}, about || "It does more than follow a route."),
+          [
+            ["Leave it", null],
+            ["Start it", () => void this.ask({ type: "run_mission", toml })],
+          ],
+        );
       }
     } catch (error) {
       setText(byId("route-error"), messageOf(error));
@@ -151,5 +155,5 @@ function text({ waypoints, behind, isDriven, frame }) {
   const count = `${counted(waypoints.length, "waypoint")}${where}`;
   if (isDriven) return `Under way: ${count}, ${behind} behind the robot. Changes ahead of it count at once.`;
   if (waypoints.length === 0) return "No waypoint yet: click on the map, or load a file.";
-  return `${count}; nothing is driven before you say so.`;
+  return `${count}. Press Drive the route to start.`;
 }
