@@ -23,9 +23,9 @@ STEER_RAD_PER_M: Final = 1.6
 STEER_MAX_RAD: Final = math.radians(60.0)
 """Steepest way towards the wall or from it."""
 AHEAD_RAD: Final = math.radians(20.0)
-"""The wall is looked for from this far to the other side of the heading …"""
+"""The wall is looked for from this far to the other side of the heading."""
 BEHIND_RAD: Final = math.radians(150.0)
-"""… to this far round on its own side."""
+"""The wall is looked for to this far round on its own side."""
 
 
 def follow_wall(scene: Scene, memory: Memory, use: FollowWallUse) -> Answer:

@@ -52,6 +52,7 @@ def wander(scene: Scene, memory: Memory, use: WanderUse) -> Answer:
 
 
 def _drawn(scene: Scene, memory: Memory, use: WanderUse) -> Memory:
+    """Return the memory with a new direction: the first drawn that is free for `use.free_m`, else the freest."""
     best, best_free_m, index = 0.0, -1.0, memory.index
     for _ in range(DRAWS):
         direction = 2.0 * math.pi * uniform(use.seed, index) - math.pi

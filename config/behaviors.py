@@ -91,9 +91,9 @@ class FollowValleyConfig(Strict):
     free_m: float = Field(default=0.9, gt=0.0, le=100.0)
     """A blocked direction is free again if the robot can drive so far in it, m."""
     occupied_probability: float = Field(default=0.6, ge=0.5, lt=1.0)
-    """Probability from which on a cell of the evidence grid counts as an obstacle, …"""
+    """Probability from which on a cell of the evidence grid counts as an obstacle."""
     sure_probability: float = Field(default=0.8, gt=0.5, le=1.0)
-    """… and from which it is sure. One in between blocks a shorter way."""
+    """Probability from which on an occupied cell is sure. One in between blocks a shorter way."""
     wide_valley_deg: float = Field(default=40.0, ge=5.0, le=180.0)
     """A valley from this width on is wide: its sides are driven at half of it from the border, degrees."""
     target_weight: float = Field(default=5.0, ge=0.0, le=1000.0)

@@ -284,6 +284,7 @@ def _lay_named(kind: Kind, key: str, names: Layers, settings: Layers) -> list[st
 
 
 def _lay_models(names: Layers, settings: Layers) -> list[str]:
+    """Put the tables of the named models into the settings; return the problems met."""
     named_by, models = names.source_of(("models",)), names.tree["models"]
     if isinstance(models, str):
         models = [models]

@@ -44,6 +44,7 @@ class ModelConfig(Strict):
 
     @model_validator(mode="after")
     def _proper_outline(self) -> ModelConfig:
+        """Refuse an outline with too few or repeated vertices, or sides that cross."""
         vertices = self.vertices_m
         if self.closed and len(vertices) < 3:
             raise ValueError("a closed outline needs at least three vertices")

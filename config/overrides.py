@@ -71,6 +71,7 @@ def apply_overrides(overrides: list[Override], layers: Layers) -> list[str]:
 
 
 def _parse_value(text: str, shown: str) -> object:
+    """Return the value that TOML reads in a text, else the text itself; `shown`: how an error names it."""
     if "\n" in text or "\r" in text:
         return text
     try:

@@ -114,6 +114,7 @@ def unknown_key(location: Location, model: type[BaseModel], also: tuple[str, ...
 
 
 def _describe(details: ErrorDetails, layers: Layers, model: type[BaseModel]) -> str:
+    """Return an error of pydantic as a line: file, key as the file has it, value, and what is wrong."""
     location, kind, value = details["loc"], details["type"], details["input"]
     context = details.get("ctx", {})
     if kind == "value_error":
@@ -139,6 +140,7 @@ def _describe(details: ErrorDetails, layers: Layers, model: type[BaseModel]) -> 
 
 
 def _message(details: ErrorDetails, model: type[BaseModel]) -> str:
+    """Return what is wrong with a value, as "must be …" or "needs …", in the words of the files."""
     location, kind, value = details["loc"], details["type"], details["input"]
     context = details.get("ctx", {})
     if kind in EXPECTED:
@@ -184,6 +186,7 @@ def _number(bound: object) -> str:
 
 
 def _other_bounds(model: type[BaseModel], location: Location, kind: str) -> str:
+    """Return the bounds of a field beside the one that was broken, as " (and …)"; empty if there are none."""
     field = _field_at(model, location)
     words: list[str] = []
     for bound in field.metadata if field is not None else ():

@@ -85,9 +85,9 @@ class RelaxationConfig(Strict):
     gamma: float = Field(default=2.0, gt=0.0, le=100.0)
     """γ: radius of a model side's sphere of influence over its length."""
     negligible_m: float = Field(default=3e-4, gt=0.0, le=1.0)
-    """Relaxation ends when an iteration moves the model by less than this, m, and …"""
+    """Relaxation ends when a step moves the model by less than this, m, and turns it less than `negligible_rad`."""
     negligible_rad: float = Field(default=1e-3, gt=0.0, le=1.0)
-    """… turns it by less than this, rad."""
+    """Turn below which relaxation ends, rad, with `negligible_m`."""
     iterations_max: int = Field(default=500, ge=1, le=ITERATIONS_MAX)
     """Most iterations for one model; after them it stays where it is until its segments change."""
     iterations_per_quantum: int = Field(default=20, ge=1, le=100_000)
@@ -149,6 +149,7 @@ class LocalizationConfig(Strict):
 
     @model_validator(mode="after")
     def _one_map_frame(self) -> LocalizationConfig:
+        """Refuse a known room without surfaces, and one beside the correction of drift."""
         if self.known_room is None:
             return self
         if self.correct_drift:
@@ -332,6 +333,7 @@ class Settings(RobotConfig):
 
     @model_validator(mode="after")
     def _mission_can_be_driven(self) -> Settings:
+        """Refuse a mission beside a goal, and one that looks for an object without a model."""
         if self.mission is None:
             return self
         if self.goal is not None:

@@ -43,6 +43,7 @@ class VaryConfig(Strict):
 
     @model_validator(mode="after")
     def _one_form(self) -> VaryConfig:
+        """Refuse a setting with neither values nor a range, with both, or with one that cannot be searched."""
         if bool(self.values) == bool(self.range):
             raise ValueError(f"{self.setting}: give either values or a range, one of the two")
         if self.range and (len(self.range) != 2 or self.range[0] >= self.range[1]):
@@ -88,6 +89,7 @@ class StudyConfig(Strict):
 
     @model_validator(mode="after")
     def _is_complete(self) -> StudyConfig:
+        """Refuse a study without one kind of runs, or with settings that do not belong to that kind."""
         given = [bool(self.scenes), bool(self.worlds), self.recordings is not None]
         if sum(given) != 1:
             raise ValueError("a study has one of scenes, worlds and recordings")

@@ -196,13 +196,16 @@ class Link:
         await line.lost.wait()
 
     def _opened(self) -> None:
+        """Call the handler of a line that has just opened."""
         self._last_error = None
         self._guard("opening", self._on_opened)
 
     def _received(self, data: bytes) -> None:
+        """Call the handler of received bytes."""
         self._guard("received data", self._on_data, data)
 
     def _lost(self, reason: str, *, has_hung_up: bool) -> None:
+        """Note why the line closed, and call the handler of its end."""
         self._line = None
         self._last_error, self.has_hung_up = reason, has_hung_up
         self._guard("closing", self._on_closed, reason)
@@ -239,6 +242,7 @@ class _Transport(serial_asyncio.SerialTransport):  # type: ignore[misc]  # the l
     _gate: select.epoll | None = None
 
     def _ensure_reader(self) -> None:
+        """Have the loop watch the line; the library calls it to begin or go on reading."""
         if not hasattr(select, "epoll"):
             super()._ensure_reader()
         elif not self._has_reader and not self._closing:
@@ -248,6 +252,7 @@ class _Transport(serial_asyncio.SerialTransport):  # type: ignore[misc]  # the l
             self._has_reader = True
 
     def _remove_reader(self) -> None:
+        """End that; the library calls it to pause reading and to close."""
         if self._gate is None:
             super()._remove_reader()
             return

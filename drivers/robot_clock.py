@@ -82,9 +82,9 @@ class RobotClock:
         self._rate: _ClockRate | None = None
         """None while the clocks are not compared."""
         self._t_us: int | None = None
-        """The last reading, unwrapped; None before the first …"""
+        """The last reading, unwrapped; None before the first."""
         self._read_s = 0.0
-        """… and when it came, by the run's clock."""
+        """When it came, by the run's clock."""
         self._trusting = False
         """Whether the next reading is accepted however far ahead."""
 

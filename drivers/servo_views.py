@@ -34,9 +34,9 @@ class ServoViews:
         self.count = len(self.sensor_of)
         self.on_servo = tuple(sensor.servo for sensor in ring.sensors or ()) or (False,) * ring.sensor_count
         self._begins = [self.sensor_of.index(i) for i in range(ring.sensor_count)]
-        """First mount of each sensor …"""
+        """First mount of each sensor."""
         self._sizes = [self.sensor_of.count(i) for i in range(ring.sensor_count)]
-        """… and how many it has."""
+        """How many mounts each sensor has."""
         self._angles = [mount.angle_rad for mount in ring.mounts]
 
     @property

@@ -161,5 +161,5 @@ def _add_value(digest: Digest, value: object, called: list[Any], where: str) -> 
 
 
 def _home(value: object) -> str:
-    """Return the package of a function or a class."""
+    """Return the package of a function or a class; a numpy ufunc names no module."""
     return str(getattr(value, "__module__", None) or "numpy").split(".")[0]

@@ -98,7 +98,7 @@ class Method(Protocol):
         ...
 
     def follow_maps(self, submap: int, moves: MapMoves | None) -> None:
-        """Note the number of the map of the way that goes on, and move what the robot left behind in each."""
+        """Continue in the map of the way with this number; move what was left behind with its map, if any moved."""
         ...
 
     def reset(self) -> None:

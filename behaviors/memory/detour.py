@@ -17,14 +17,15 @@ from perception.percept import Canyon, Pose, wrap_angle
 Side: TypeAlias = Literal[-1, 1]
 
 LEAVE_FREE_M: Final = 1.2
-"""The detour ends where the goal's direction is free for this far, …"""
+"""The detour ends where the goal's direction is free for this far, and the goal is nearer by `PROGRESS_M`."""
 PROGRESS_M: Final = 0.4
-"""… and the goal is nearer by this than it has been before: so no detour ends where an earlier one began; by half of
+"""The goal must be nearer by this than it has been before: so no detour ends where an earlier one began; by half of
 what was left where that is less: one that began beside the goal would pass it."""
 TURNED_BACK_RAD: Final = math.radians(150.0)
-"""What was only presumed is given up if going round it leads back more than this, …"""
+"""What was only presumed is given up if going round it leads back more than this."""
 FARTHER_M: Final = 1.5
-"""… or so much farther from the goal than where the detour began: then other walls are followed, in turn."""
+"""It is given up, too, so much farther from the goal than where the detour began: then other walls are followed, in
+turn."""
 PRESUMED_SHARE: Final = 0.7
 """Nothing more is presumed until the robot has come nearer by this share of the distance at which it was."""
 NEARER_M: Final = 0.1
@@ -47,12 +48,12 @@ class Detour:
     side: Literal[-1, 0, 1] = 0
     """Of the obstacle that is gone round: +1 it stays on the left, −1 on the right; 0 without a detour."""
     began_m: Coordinate = 0.0
-    """Least distance to the goal until the detour began, …"""
+    """Least distance to the goal until the detour began."""
     began_x: Coordinate = 0.0
     began_y: Coordinate = 0.0
-    """… the place where it did, …"""
+    """The place where it began."""
     began_driven_m: Coordinate = 0.0
-    """… and how far the robot had driven by then."""
+    """How far the robot had driven when it began."""
     driven_m: Coordinate = 0.0
     """The way since the goal was set."""
     rounds: Count = 0
@@ -70,11 +71,11 @@ class Detour:
     leaving: Canyon | None = None
     """The narrow canyon that the robot is in and must leave."""
     ahead: Ahead | None = None
-    """What stays far ahead, …"""
+    """What stays far ahead."""
     block: Block | None = None
-    """… what it is presumed to be a part of, …"""
+    """What that is presumed to be a part of."""
     presume_below_m: Coordinate = FAR_M
-    """… and the distance to the goal below which something may be presumed."""
+    """Distance to the goal below which something may be presumed."""
 
     @property
     def is_held(self) -> bool:

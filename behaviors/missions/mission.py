@@ -190,7 +190,7 @@ def route(waypoints: tuple[Waypoint, ...], frame: Frame) -> Mission:
 
 
 def _numbers(progress: Progress) -> Iterator[float]:
-    """Yield every number of a mission's progress that should be small."""
+    """Yield the numbers of a mission's progress that a check bounds: a recording may hold any."""
     poses = [pose for pose in (progress.start, progress.last, progress.anchor) if pose is not None]
     yield from (n for pose in poses for n in (pose.x, pose.y, pose.theta))
     for memory in progress.memories:

@@ -28,9 +28,9 @@ NEAR_M: Final = 1.2
 """What is nearer to the rim is no longer far ahead."""
 STAYS_M: Final = 0.15
 STAYS_SHARE: Final = 0.03
-"""An echo stays where it is if it moves less than this, or than this share of its range …"""
+"""An echo stays where it is if it moves less than this, or than this share of its range, over `STAYS_FOR_M`."""
 STAYS_FOR_M: Final = 0.4
-"""… over so much driving. One that is not heard for this way is forgotten."""
+"""Driving after which an echo is judged so. One that is not heard for this way is forgotten."""
 FIRST_M: Final = 0.02
 """Weight of the first echo in the mean, as way."""
 AHEAD_RAD: Final = math.radians(18.0)
@@ -79,10 +79,10 @@ class Pocket(NamedTuple):
 
     mouth_m: float
     back_m: float
-    """Where the nearer of its sides begins, and how far it is heard, along the way …"""
+    """Where the nearer of its sides begins, and how far it is heard, along the way."""
     low_m: float
     high_m: float
-    """… and its sides, across, counted to the left."""
+    """Its sides, across, counted to the left."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,10 +94,10 @@ class Block:
     axis_rad: Coordinate
     front_m: Coordinate
     back_m: Coordinate
-    """Its extent along the axis …"""
+    """Its extent along the axis."""
     low_m: Coordinate
     high_m: Coordinate
-    """… and across, counted to the left."""
+    """Its extent across, counted to the left."""
 
 
 def pocket_ahead(echoes: Floats, pose: Pose, way_rad: float, reach_m: float) -> Pocket | None:

@@ -267,6 +267,7 @@ class ArcosDriver(Session[PoseStamper]):
         self._refused_until_s = self._run_s + _REFUSED_S
 
     def _take(self, packet: Packet) -> None:
+        """Take in a packet: a reset begins anew, others serve the handshake, odometry and the measure of the line."""
         self._packet_s, self.heard.has_frames = self._run_s, True
         if isinstance(packet, ResetNotice):
             self._was_reset = True

@@ -32,9 +32,9 @@ class Rotation:
         """What replaces it at the end of the step."""
         self._listeners: tuple[int, ...] = ()
         self._number = 0
-        """Number of the next step …"""
+        """Number of the next step."""
         self._at_us = 0
-        """… and when it starts."""
+        """When it starts."""
 
     @property
     def next_us(self) -> int | None:

@@ -63,9 +63,9 @@ class TcpServerPort:
         self._connection: socket.socket | None = None
         self.dropped = 0
         self._packet = bytearray()
-        """Bytes to send in one packet …"""
+        """Bytes to send in one packet."""
         self._is_growing = False
-        """… and whether some were added since the last `read`: it is sent at a pause."""
+        """Whether some were added since the last `read`: it is sent at a pause."""
         self.open()
 
     @property

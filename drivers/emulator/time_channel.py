@@ -36,9 +36,9 @@ class TimeScaleFollower:
         self._number = 0
         """Number of the time scale in force."""
         self._simulated_s = -math.inf
-        """The run's time up to which the robot has been simulated …"""
+        """The run's time up to which the robot has been simulated."""
         self._acknowledged_s = -math.inf
-        """… and up to which that has been sent."""
+        """The time up to which that has been acknowledged to the run."""
         self._must_acknowledge = False
         """Whether the time scale in force has not been acknowledged yet."""
         self._rest = b""

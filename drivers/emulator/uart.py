@@ -27,9 +27,9 @@ class Uart:
         self._queue = bytearray()
         """Bytes that have not left completely."""
         self._start_us = 0
-        """Since then bytes leave without a pause at this speed …"""
+        """Since then bytes leave without a pause at this speed."""
         self._left_bytes = 0
-        """… and so many have left."""
+        """So many have left since then."""
         self.dropped = 0
 
     def send(self, frame: bytes, now_us: int) -> None:

@@ -96,9 +96,9 @@ class RflexDevice(EventDevice):
     _heard: tuple[tuple[int, int], ...] | None
     """What the last firing heard: reported at the next."""
     _was_touched: bool
-    """What the last report of the bumpers said …"""
+    """What the last report of the bumpers said."""
     _has_touched: bool
-    """… and whether there was one."""
+    """Whether there was one."""
     _number: int
 
     def __init__(

@@ -110,11 +110,11 @@ class RflexDriver(Session[Measurements]):
         self._queue: deque[Frame] = deque()
         """Commands that can wait, in the order in which they are sent."""
         self._axes = drive_commands(Twist(0.0, 0.0), config)
-        """The newest velocity, as a command for each axis …"""
+        """The newest velocity, as a command for each axis."""
         self._axes_left = 0
-        """… of which so many are still to be sent …"""
+        """How many of these are still to be sent."""
         self._axis_turn = 0
-        """… beginning with this one."""
+        """The one that is sent next."""
         self._is_ending = False
         """Whether the next `outgoing` ends the session."""
         self._is_moving = False

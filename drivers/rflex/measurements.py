@@ -64,9 +64,9 @@ class Measurements(Stamper):
     _suspect: tuple[int, int, float] | None
     """A reading that was impossible after the last one."""
     _backs: int
-    """Readings in a row whose clock jumped back …"""
+    """Readings in a row whose clock jumped back."""
     _aheads: int
-    """… or ahead."""
+    """Readings in a row whose clock jumped ahead."""
     _is_new: bool
     """Whether this is the first reading of a line."""
 

@@ -169,9 +169,9 @@ class StallMonitor:
         self.is_stalled = False
         self._body = config.body
         self._wanted = self._modelled = Twist(0.0, 0.0)
-        """The velocity commanded, and that of the model …"""
+        """The velocity commanded, and that of the model."""
         self._run_s = 0.0
-        """… at this time."""
+        """When they were computed, by the run's clock."""
         self._history: deque[tuple[float, Twist]] = deque()
         """Times and velocities of the model, of the last `_PUSHED_S` and one before."""
 

@@ -59,9 +59,9 @@ class RobotSide:
         self._last_s = self._last_host_s = 0.0
         self._heading: float | None = None
         self._group: dict[int, int] = {}
-        """Counts of the ranges that make up the next echo, by sensor …"""
+        """Counts of the ranges that make up the next echo, by sensor."""
         self._group_s = 0.0
-        """… and the stamp of the first of them."""
+        """The stamp of the first of them."""
         self._noted: set[str] = set()
         self._notes: list[str] = []
 

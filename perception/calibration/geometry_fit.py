@@ -257,7 +257,10 @@ def _spread(values: Floats) -> float:
 def _choose(
     geometry: Geometry, beams: Beams, echoes: Echoes, half_angle: float, gate: Floats
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the readings that are echoes of a surface, and of which."""
+    """Return which readings are echoes of a surface, and of which: the one in the beam that fits it best.
+
+    `gate`: greatest difference of measured and expected range, m, of each reading.
+    """
     distance, bearing = geometry.surfaces.distances(beams.x, beams.y)
     turned = np.remainder(bearing - beams.axis + math.pi, 2.0 * math.pi) - math.pi
     misfit = np.abs(echoes.range_m - geometry.scales.range * distance)

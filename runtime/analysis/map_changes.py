@@ -33,9 +33,9 @@ LOOK_MAX_M: Final = 4.0
 BEAM_SHARE: Final = 0.7
 """Share of the beam, from its axis, in which sound is surely reflected back."""
 LOOKS_MIN: Final = 8
-"""Fewest looks at an object, or at an opening, that show it …"""
+"""Fewest looks at an object, or at an opening, that show it."""
 PIECE_LOOKS_MIN: Final = 2
-"""… and at each piece of an opening."""
+"""Fewest looks at each piece of an opening that show it."""
 HIT_SHARE_MAX: Final = 0.15
 """Largest share of hits among the looks at what is gone: false echoes."""
 CELL_M: Final = 0.25

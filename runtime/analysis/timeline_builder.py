@@ -57,9 +57,9 @@ class TimelineBuilder:
         self._next_s = 0.0
         """When the next snapshot is due."""
         self._rows: list[Echoes] = []
-        """Readings of each firing …"""
+        """Readings of each firing."""
         self._row_count = 0
-        """… and how many they are."""
+        """How many readings they are."""
         self._crosses: list[CrossPathRows] = []
         """Cross paths of each firing."""
         self._segments: dict[bytes, tuple[float, float, Floats]] = {}

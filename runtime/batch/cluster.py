@@ -67,9 +67,9 @@ class DaskPool:
         self._under_way: dict[str, tuple[Run, int]] = {}
         """Each run and its attempt, by the key of its future."""
         self._capacity = 1
-        """Runs that should be under way, by the last count of the workers …"""
+        """Runs that should be under way, by the last count of the workers."""
         self._counted_s = -COUNT_PERIOD_S
-        """… at this host time."""
+        """Host time of that count."""
 
     def capacity(self) -> int:
         """Return how many runs should be under way; it asks the scheduler every `COUNT_PERIOD_S`."""

@@ -54,6 +54,7 @@ class StandardOutput(io.TextIOWrapper):
 
     @contextlib.contextmanager
     def _reported(self) -> Iterator[None]:
+        """Turn an error of writing into an end in order: quietly if the reader has gone, else with the cause."""
         try:
             yield
         except OSError as error:

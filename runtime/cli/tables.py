@@ -94,6 +94,7 @@ def _found(what: str, rows: Sequence[DrumRow | BoxRow]) -> str:
 
 
 def _summary_line(found: str, outcome: Outcome, units: Units) -> str:
+    """Return the line below a table of objects: found, false, errors, and the cost of a cycle."""
     mean, worst = outcome["mean_error"], outcome["max_error"]
     errors = (
         ""

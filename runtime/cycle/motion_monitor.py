@@ -111,21 +111,21 @@ class MotionMonitor:
     directions: tuple[Direction, ...] = ()
     """Forward, backward, left, right; empty before the first sample."""
     still: Pose | None = None
-    """The pose from which the odometry has not moved by `MOVED`, and …"""
+    """The pose from which the odometry has not moved by `MOVED`."""
     still_s: Seconds = 0.0
-    """… for how long, by the robot's clock."""
+    """For how long it has not, by the robot's clock."""
     has_stood: bool = True
     """Whether the base has stood since it was last commanded to move."""
     asked_s: Seconds = 0.0
-    """For how long the base has been commanded to drive one way without having moved, …"""
+    """For how long the base has been commanded to drive one way without having moved."""
     asked: Amount = NOTHING
-    """… how far the model has moved meanwhile, …"""
+    """How far the model has moved in `asked_s`."""
     asked_turn_s: Seconds = 0.0
-    """… and for how long to turn one way, s."""
+    """For how long the base has been commanded to turn one way without having moved, s."""
     modelled: Twist = STANDSTILL
-    """Velocity of a base that obeys within the limits of its file, and …"""
+    """Velocity of a base that obeys within the limits of its file."""
     modelled_run_s: Seconds | None = None
-    """… when it had that, by the run's clock; None before the first cycle."""
+    """When it had that, by the run's clock; None before the first cycle."""
 
     def contradiction(self) -> str | None:
         """Return why directions and odometry do not belong together; None if they do."""

@@ -197,6 +197,7 @@ class RecordingWriter:
         self._guarded(lambda: self._enter(item))
 
     def _tick(self) -> None:
+        """Flush, sync and keep the limits of the folder, each when its time has come."""
         host_s = time.monotonic()
         if host_s - self._flushed_s >= FLUSH_S:
             self._guarded(self._flush)

@@ -65,13 +65,13 @@ class CanyonRow(TypedDict):
     worlds: int
     escaped: int
     deep: int
-    """Canyons deeper than `DEEP_M` …"""
+    """Canyons deeper than `DEEP_M`."""
     turned: int
-    """… and those before which the robot turned."""
+    """Deep canyons before which the robot turned."""
     heard: int
-    """Deep canyons whose back is heard in time to turn …"""
+    """Deep canyons whose back is heard in time to turn."""
     turned_heard: int
-    """… and those of them before which the robot turned."""
+    """Those of `heard` before which the robot turned."""
     entered_again: int
     contacts: int
     way: float | None

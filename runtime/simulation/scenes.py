@@ -145,6 +145,7 @@ def _moved(name: str, seed: int, acoustics: AcousticsConfig) -> tuple[Hall, ...]
 
 
 def _boxes(name: str, angle_deg: float) -> tuple[Hall, ...]:
+    """Return a hall with boxes in place of drums, turned by an angle, for each way that surfaces answer."""
     side = BOX_SIDE_FT * FOOT_M
     boxes = tuple(
         BoxConfig(x_m=x * FOOT_M, y_m=y * FOOT_M, width_m=side, depth_m=side, angle_deg=angle_deg)

@@ -71,6 +71,7 @@ def _pin(core: int) -> str | None:
 
 
 def _lock() -> str | None:
+    """Lock all memory, now and later, as it is touched; return why the system refuses that, None if it does not."""
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.mlockall(_CURRENT | _FUTURE | _ONFAULT) == 0:
         return None
@@ -82,6 +83,7 @@ def _lock() -> str | None:
 
 
 def _priority(priority: int) -> str | None:
+    """Run this thread with a real-time priority; return why the system refuses that, None if it does not."""
     try:
         # Child processes must not inherit it.
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))

@@ -83,7 +83,7 @@ LINE_CELLS: Final = int((WALL_BINS * WALL_BIN_M + 2.0 * HEARD_REACH_M) / LINE_CE
 def choose_wall(s: StateRecord, turn: int) -> int:
     """Return the wall on whose line points are looked for; −1 if there is none.
 
-    `s`, `turn`: as for `find_heard_points`.
+    `turn`: counts the calls: each looks at the next of the walls whose weight is at least `FIRM_WEIGHT`.
     """
     room = s[0].room
     known = 0
@@ -253,7 +253,7 @@ def step_along(found: RoomCorner, wall: Wall) -> float:
 
 @kernel
 def end_of_edge(wall: Wall, along: float) -> int:
-    """Return of which end of a span a post at `along` (m) is the edge, as `RoomCorner.second`: 1 high, 0 low.
+    """Return which end of a span a post at `along` (m) marks, as `RoomCorner.second` has it: 1 high, 0 low.
 
     That is the end nearest to it. But `EDGE_SAME_M` beyond that end or farther, the post is taken for the other side
     of an opening, where a span begins that is not known yet: then it is the opposite end. 0 for a wall without spans.

@@ -167,6 +167,7 @@ class EchoLag:
         return np.append(compose(recent[-1, 1:4], moved), recent[-1, 4] + turn)
 
     def _take_down(self, firing: Firing, here: Floats) -> None:
+        """Note a firing's pose `here` (s; x, y, m; rad) and its new ranges, until the window ends."""
         if self._trail_count > 0:
             step = here - self._trail[self._trail_count - 1]
             self._moved += math.hypot(step[1], step[2]), abs(step[3])

@@ -217,6 +217,7 @@ class SubmapGraph:
             self._take(outcome)
 
     def _begin_job(self) -> Iterator[Outcome | None]:
+        """Return the work of matching the next map, on copies: what is driven meanwhile does not disturb it."""
         links = self._links.archived_rows
         maps = Maps(
             self._submaps.archived_rows[: self._matched + 1],
@@ -286,7 +287,7 @@ class SubmapGraph:
         return self._placed(moment.submap, moment.odometry)
 
     def _placed(self, submap: int, odometry: Floats) -> Floats:
-        """Return poses (…, 3) of a map by odometry in the map frame."""
+        """Return in the map frame poses (…, 3) that odometry gives while the robot is in this map of the way."""
         submaps = self._submaps.archived_rows
         if not self.is_applied or len(submaps) == 0:
             return odometry

@@ -133,9 +133,9 @@ class LocalMap(Record):
     left: Annotated[int, up_to(QUANTA_MAX)]
     """Quanta that are left after the last firing."""
     heard: Finite
-    """Echoes from the cells of the pieces, …"""
+    """Echoes from the cells of the pieces."""
     passed: Finite
-    """… and ranges that passed there in the directions that hear them."""
+    """Ranges that passed those cells in the directions that hear them."""
     cell_count: Annotated[int, up_to(SURFACE_CELLS_MAX)]
     piece_count: Annotated[int, up_to(PIECES_MAX)]
     kept_x: Annotated[Floats, SENSORS_MAX, PLACE]

@@ -85,7 +85,7 @@ class SurfaceMap(NoSurfaces):
         self._search.quanta_left = self._config.quanta_per_firing
 
     def follow_maps(self, submap: int, moves: MapMoves | None) -> None:
-        """Note the number of the map of the way that goes on, and move what is remembered of each."""
+        """Continue in the map of the way with this number; move surfaces with their maps (None: none has moved)."""
         self._search.local["submap"] = submap
         if moves is not None:
             self._search.move(moves)

@@ -124,7 +124,10 @@ class _BagExporter:
         return self._store.types[kind](**values)
 
     def _value(self, form: Any, value: Any) -> Any:  # noqa: ANN401 - a field of any message
-        """Return a field's value in its form, as `fielddefs` describes it; None becomes zero, empty or false."""
+        """Return what rosbags takes for a field: arrays of numpy, its own messages; None becomes zero or empty.
+
+        `form`: the field's type as `fielddefs` of rosbags has it: a kind of node and what belongs to that.
+        """
         node, about = form
         if node is Nodetype.NAME:
             return self._message(about, value or {})

@@ -148,6 +148,7 @@ def emulate(
 
 
 def _port_maker(line: LineOptions) -> Callable[[], EmulatorPort]:
+    """Return what opens the emulator's end of the line, a TCP port or a pseudo-terminal."""
     if line.tcp is None:
         from drivers.emulator.pty_transport import PtyPort
 

@@ -128,6 +128,7 @@ class Questions:
         sys.stderr.write(f"{one_line(refusal)}\nOnce more: Enter keeps an answer.\n")
 
     def _answer(self, name: str, question: str, default: T, parse: Callable[[str], T]) -> T:
+        """Return the option `name` if it was given, else what is answered on the terminal, else the default."""
         self._used.add(name)
         given = self._given.get(name)
         if given is not None:

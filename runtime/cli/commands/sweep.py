@@ -277,18 +277,7 @@ def write_results(
 ) -> list[Combination]:
     """Write table and page of all finished runs, and return what was found for each combination of settings.
 
-    Parameters
-    ----------
-    name : str
-        Of the study.
-    study : StudyConfig
-        The study.
-    runs : sequence of Run
-        All its runs.
-    folder : Path
-        Of the sweep.
-    unfinished : sequence of Unfinished
-        Runs that were given up.
+    `runs`: all of the study. `folder`: that of the sweep. `unfinished`: the runs that were given up.
     """
     from runtime.batch.outcome import combine
     from runtime.batch.report import sweep_page

@@ -186,10 +186,12 @@ class Picture:
         return [Text(count + more, style="bold"), *lines]
 
     def _is_hidden(self, seen: DetectedObject, snapshot: Snapshot) -> bool:
+        """Return whether another object stands between the robot and this one; its row of the list says so."""
         radius_m = self._radii_m.get(seen.model, CORNERED_M)
         return snapshot.pose is not None and is_hidden(seen, radius_m, snapshot.pose[:2], snapshot.objects)
 
     def _counts(self, snapshot: Snapshot) -> list[Text]:
+        """Return the lines below the picture: ring, map, place, line and timing."""
         (frames, bad, lost), took, lag = snapshot.line, snapshot.cycle_us, snapshot.lag_us
         rows = [("ring", self._ring(snapshot.ranges)), ("map", map_text(snapshot.map_counts))]
         if snapshot.place is not None:

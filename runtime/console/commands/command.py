@@ -121,12 +121,12 @@ class Call(NamedTuple):
 
 
 def never(_: object) -> bool:
-    """Return False."""
+    """Return False: the default of `Command.can_begin_motion`."""
     return False
 
 
 def always(_: object) -> bool:
-    """Return True."""
+    """Return True: `Command.can_begin_motion` of a command that moves the robot with any arguments."""
     return True
 
 

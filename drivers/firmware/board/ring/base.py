@@ -81,6 +81,7 @@ class Base:
             self.halt(_MOTOR_FAULT)
 
     def _control(self) -> None:
+        """Measure the wheels, check bumper, battery and deadman, and drive towards the target unless latched."""
         now = ticks_us()
         dt_s = ticks_diff(now, self._ticks) * 1e-6
         if dt_s <= 0.0:

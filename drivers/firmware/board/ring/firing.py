@@ -124,6 +124,7 @@ class Firing:
         return sent
 
     def _start(self, now: int) -> None:
+        """Fire the sensors of the next step, staggered by their triggers, and note when the window closes."""
         if self._changed:
             self._masks, self._window_us = self._next_masks, self._next_window_us
             self._period_us = self._next_period_us
@@ -157,6 +158,7 @@ class Firing:
         self._closing = True
 
     def _report(self) -> None:
+        """Send the echoes of the step whose window has closed, in the frame that the version has."""
         self._closing = False
         frame = self._encoder.frame
         pack_into("<IB", frame, 2, self._clock.t_us(self._fired_at), self._fired_step)

@@ -26,6 +26,7 @@ class IrqTimer:
             self.pin.irq(self._edge, edges)
 
     def _edge(self, _pin: Pin) -> None:
+        """Note the time of an edge, at the pins of the group whose level it changed; an interrupt calls it."""
         now = ticks_us()
         for timer in self._group:
             if timer._edges != 2 and timer.pin.value() != timer._edges:

@@ -79,6 +79,7 @@ class Robot:
             self._collect_due = ticks_add(now, _COLLECT_US)
 
     def _read(self, now: int) -> None:
+        """Read at most `_READ_MAX` bytes and obey each whole frame; an interrupt asks for the console."""
         decoder = self._decoder
         for _ in range(_READ_MAX):
             byte = self.line.read()
@@ -93,6 +94,7 @@ class Robot:
             raise ConsoleRequested
 
     def _obey(self, kind: int, seq: int, payload: memoryview) -> None:
+        """Carry out a command and answer ACK or NAK; codes below 0 get no answer."""
         code = self._refusal(kind, seq, payload)
         frame = self._encoder.frame
         frame[2] = seq
@@ -136,6 +138,7 @@ class Robot:
         return 0
 
     def _identify(self, version: int) -> None:
+        """Answer HELLO with IDENT, and speak this version from now on."""
         config, frame = self._config, self._encoder.frame
         self.firing.version = version
         name = config.NAME.encode()[:16]

@@ -47,6 +47,7 @@ class NetworkPresence:
     def __init__(self, pipe: asyncio.StreamWriter, run: Run) -> None:
         self._pipe, self._run = pipe, run
         self._said = ("", "")
+        """Name and mode that were sent last."""
 
     def on_cycle(self, record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
         """Send name and mode if they have changed; waits for nothing."""

@@ -39,9 +39,9 @@ class RunPlan:
     foxglove: bool
     """Whether it is served to Foxglove."""
     record: str | None
-    """The file it is recorded in, None for one in the folder of recordings, …"""
+    """The file it is recorded in, None for one in the folder of recordings."""
     no_record: bool
-    """… or whether it is not recorded."""
+    """Whether it is not recorded."""
 
     @property
     def is_armed(self) -> bool:
