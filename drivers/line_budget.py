@@ -64,17 +64,12 @@ FLOOD: Final = (
 
 
 class ReceiveBudget:
-    """Bounds the bytes that a driver gets from its line, so that no peer can fill the loop's time.
-
-    Attributes
-    ----------
-    dropped
-        Number of bytes beyond the budget.
-    """
+    """Bounds the bytes that a driver gets from its line, so that no peer can fill the loop's time."""
 
     def __init__(self, link: LinkConfig) -> None:
         is_serial = "://" not in (link.port or "")
         self.dropped = 0
+        """Number of bytes beyond the budget."""
         self._bucket = TokenBucket(
             RATE_SHARE * link.baud / BITS_PER_BYTE if is_serial else NETWORK_BYTES_S, BURST_BYTES
         )

@@ -25,18 +25,13 @@ class OdometryJumps:
     """Finds the jumps of one base's odometry, and removes them.
 
     The limits of its body distinguish a motion from a jump.
-
-    Attributes
-    ----------
-    count
-        Jumps that were removed.
-    origin
-        The origin of the poses passed on, in the robot's own odometry; the identity until that jumps.
     """
 
     def __init__(self, body: BodyConfig) -> None:
         self.count = 0
+        """Jumps that were removed."""
         self.origin = IDENTITY
+        """The origin of the poses passed on, in the robot's own odometry; the identity until that jumps."""
         self._body = body
         self._ring_offset = 0.0
         """The same of the ring's direction, rad."""

@@ -68,17 +68,12 @@ class _ClockRate:
 
 
 class RobotClock:
-    """Unwraps the counter with the last reading and the run's time since then, so that it may be silent for long.
-
-    Attributes
-    ----------
-    rate_error
-        By how much the clock is too fast, or where negative too slow, as found by the last reading; None if nothing
-        was found.
-    """
+    """Unwraps the counter with the last reading and the run's time since then, so that it may be silent for long."""
 
     def __init__(self) -> None:
         self.rate_error: float | None = None
+        """By how much the clock is too fast, or where negative too slow, as found by the last reading; None if
+        nothing was found."""
         self._rate: _ClockRate | None = None
         """None while the clocks are not compared."""
         self._t_us: int | None = None

@@ -18,21 +18,15 @@ class ServoViews:
     """The bearings of a ring's sensors.
 
     Without servos each sensor has one bearing.
-
-    Attributes
-    ----------
-    count
-        Mounts: bearings of all sensors.
-    on_servo
-        Whether each sensor stands on a servo.
-    sensor_of
-        The sensor of each mount.
     """
 
     def __init__(self, ring: RingConfig) -> None:
         self.sensor_of = ring.sensor_of
+        """The sensor of each mount."""
         self.count = len(self.sensor_of)
+        """Mounts: bearings of all sensors."""
         self.on_servo = tuple(sensor.servo for sensor in ring.sensors or ()) or (False,) * ring.sensor_count
+        """Whether each sensor stands on a servo."""
         self._begins = [self.sensor_of.index(i) for i in range(ring.sensor_count)]
         """First mount of each sensor."""
         self._sizes = [self.sensor_of.count(i) for i in range(ring.sensor_count)]

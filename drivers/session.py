@@ -22,15 +22,7 @@ S = TypeVar("S", bound=Stamper)
 
 
 class Session(ABC, Generic[S]):
-    """The part of a `drivers.driver.RobotDriver` that does not depend on the protocol; a driver is a subclass of it.
-
-    Attributes
-    ----------
-    heard
-        The bytes of the line in place of the robot's frames.
-    is_other_robot
-        Whether what the robot says of itself is not what its file describes, so that another file may be its own.
-    """
+    """The part of a `drivers.driver.RobotDriver` that does not depend on the protocol; drivers are subclasses."""
 
     def __init__(self, stamper: S, silence_max_s: float = math.inf) -> None:
         self.stamper = stamper
@@ -52,7 +44,10 @@ class Session(ABC, Generic[S]):
         self._noted = set[str]()
         """Messages of `_note_once` so far."""
         self.heard = HeardBytes()
+        """The bytes of the line in place of the robot's frames."""
         self.is_other_robot = False
+        """Whether what the robot says of itself is not what its file describes, so that another file may be its
+        own."""
 
     @property
     def state(self) -> LineState:

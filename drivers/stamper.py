@@ -35,18 +35,13 @@ class Stamper:
     """The part of a protocol's stamper that does not depend on the protocol.
 
     The limits of the body distinguish a motion from a jump.
-
-    Attributes
-    ----------
-    late_echoes
-        Firings dropped: without odometry around them, duplicated, or older than one before.
-    excess_echoes
-        Firings dropped because the robot sends many more than its pattern has.
     """
 
     def __init__(self, body: BodyConfig) -> None:
         self.late_echoes = DroppedCount(LATE_FIRINGS, self.note)
+        """Firings dropped: without odometry around them, duplicated, or older than one before."""
         self.excess_echoes = 0
+        """Firings dropped because the robot sends many more than its pattern has."""
         self._excess_noted_s = -math.inf
         """When that was noted last."""
         self._jumps = OdometryJumps(body)

@@ -28,17 +28,12 @@ class TokenBucket:
 
 
 class LineLimit:
-    """Limits the lines of one kind in the log, and counts those that are left out.
-
-    Attributes
-    ----------
-    suppressed
-        Number of lines left out since the last one.
-    """
+    """Limits the lines of one kind in the log, and counts those that are left out."""
 
     def __init__(self, rate_per_s: float, burst: float) -> None:
         self._bucket = TokenBucket(rate_per_s, burst)
         self.suppressed = 0
+        """Number of lines left out since the last one."""
 
     def take(self, now_s: float) -> int | None:
         """Return how many lines were left out before this one, and forget them; None if this one is left out, too."""

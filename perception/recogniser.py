@@ -24,17 +24,13 @@ class Recogniser:
 
     `ring`: the sensors, as in ``config.load.load_robot("p3dx").ring``. `models`: the objects to recognise, as in
     ``[config.load.load_model("drum")]``. `config`: the method and its settings.
-
-    Attributes
-    ----------
-    perception : Perception
-        All that is known: segments, walls, edits of the map, snapshots.
     """
 
     def __init__(
         self, ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig | None = None
     ) -> None:
         self.perception = Perception(ring, models, PerceptionConfig() if config is None else config)
+        """All that is known: segments, walls, edits of the map, snapshots."""
         self._sensors = len(ring.mounts)
         self._time_s = -math.inf
 

@@ -47,15 +47,7 @@ class VacantArea(NamedTuple):
 
 
 class VacantAreas:
-    """The areas of one map.
-
-    Attributes
-    ----------
-    rows : (AREAS_MAX,) AREA
-        The first `count` are valid.
-    count, last : int
-        Number of areas, and the number that was given last.
-    """
+    """The areas of one map."""
 
     BOUNDS: Final = bounds(
         rows={"x": PLACE, "y": PLACE, "radius": PLACE, "number": COUNT, "object": COUNT},
@@ -65,8 +57,10 @@ class VacantAreas:
 
     def __init__(self) -> None:
         self.rows = np.zeros(AREAS_MAX, AREA)
+        """(AREAS_MAX,): the first `count` are valid."""
         self.count = 0
         self.last = 0
+        """Number of areas, and the number that was given last."""
         self._archived: tuple[DetectedObject, ...] = ()
         self._archived_seen: tuple[DetectedObject, ...] = ()
         self._polylines: tuple[Polyline, ...] = ()

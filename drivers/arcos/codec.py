@@ -243,16 +243,12 @@ class Decoder(Generic[F]):
     """Turns the bytes of one direction into commands or packets.
 
     It decodes bodies by `decode_command` for the bytes to the robot, by `decode_packet` for those from it.
-
-    Attributes
-    ----------
-    frames, bad
-        Frames decoded, and headers whose frame has an impossible length or a wrong checksum.
     """
 
     def __init__(self, decode: Callable[[bytes], F]) -> None:
         self.frames = 0
         self.bad = 0
+        """Frames decoded, and headers whose frame has an impossible length or a wrong checksum."""
         self._decode = decode
         self._pending = bytearray()
         """Bytes from the first incomplete frame on."""

@@ -35,21 +35,15 @@ _AXIS_INPUTS: Final = 8
 
 
 class RequestedPackets:
-    """The packets that a client asked for: one, or one with each SIP; and the settings that only SIPs show.
-
-    Attributes
-    ----------
-    analog_port
-        The analog port that SIPs show, set by ADSEL.
-    digital_out
-        The digital outputs, set by DIGOUT.
-    """
+    """The packets that a client asked for: one, or one with each SIP; and the settings that only SIPs show."""
 
     def __init__(self) -> None:
         self._asked: dict[int, int] = {}
         """For each request: 0 none, 1 a single packet, above that one with each SIP."""
         self.analog_port = 0
+        """The analog port that SIPs show, set by ADSEL."""
         self.digital_out = 0
+        """The digital outputs, set by DIGOUT."""
 
     def obey(self, command: Command) -> bool:
         """Carry out a command for such a packet or setting; return False if it is none."""

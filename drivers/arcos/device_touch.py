@@ -21,11 +21,6 @@ class Touch:
     """Two bumpers round a base, each of segments from left to right, counted from 1.
 
     `radius_m` is the base's.
-
-    Attributes
-    ----------
-    stalls_at
-        Argument of BUMPSTALL: whose contact stalls the base; 1 front, 2 rear, 3 both.
     """
 
     def __init__(self, firmware: Firmware, scene: Scene, radius_m: float) -> None:
@@ -36,6 +31,7 @@ class Touch:
         self._last: tuple[Pose, tuple[int, int]] | None = None
         """The last pose asked for, and its answer."""
         self.stalls_at = 0
+        """Argument of BUMPSTALL: whose contact stalls the base; 1 front, 2 rear, 3 both."""
 
     @property
     def middle(self) -> int:

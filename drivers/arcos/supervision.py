@@ -31,15 +31,11 @@ class Halting:
 
     Switched off in motion, motors may let the base roll; so they are switched off when it stands, or when it does not
     obey for long. Until they are off, a velocity that was sent before the stop could still take effect.
-
-    Attributes
-    ----------
-    is_active
-        Whether the base has yet to stand with its motors off.
     """
 
     def __init__(self) -> None:
         self.is_active = False
+        """Whether the base has yet to stand with its motors off."""
         self._began_s: float | None = None
         """When the first stop of this halt was sent; None before."""
         self._sent_s: float | None = None

@@ -278,19 +278,15 @@ class Decoder:
 
     `direction` is the side that sends. `midway`: the line may be in use already, so that the first bytes are the end
     of a frame: up to the first 0x00 they are dropped without being counted.
-
-    Attributes
-    ----------
-    frames, bad
-        Frames decoded, and frames dropped: invalid stuffing, length, checksum or content.
-    lost
-        Frames missing by the sender's sequence numbers, among them those dropped for stuffing, length or checksum.
     """
 
     def __init__(self, direction: Literal["host", "robot"], *, midway: bool = False) -> None:
         self.frames = 0
         self.bad = 0
+        """Frames decoded, and frames dropped: invalid stuffing, length, checksum or content."""
         self.lost = 0
+        """Frames missing by the sender's sequence numbers, among them those dropped for stuffing, length or
+        checksum."""
         self._layouts = _BY_TYPE[direction]
         self._pending = bytearray()
         """The stuffed bytes of the frame that is incomplete."""

@@ -38,17 +38,12 @@ _FUTURE_MAX_US = 1_000_000
 
 
 class PoseStamper(Stamper):
-    """Gives each firing its pose, from the history of the odometry.
-
-    Attributes
-    ----------
-    out_of_window
-        Ranges and cross paths dropped because they lie beyond the window of their firing.
-    """
+    """Gives each firing its pose, from the history of the odometry."""
 
     def __init__(self, ring: RingConfig, body: BodyConfig) -> None:
         super().__init__(body)
         self.out_of_window = DroppedCount(RANGES_BEYOND, self.note)
+        """Ranges and cross paths dropped because they lie beyond the window of their firing."""
         self._axes = tuple(mount.angle_rad for mount in ring.mounts)
         self._views = ServoViews(ring)
         self._clock = RobotClock()

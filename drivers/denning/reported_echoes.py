@@ -17,16 +17,11 @@ from drivers.servo_views import ServoViews
 
 
 class EchoReporter:
-    """Fires the ring's sensors and reports what they hear, faults of sensors included.
-
-    Attributes
-    ----------
-    unit_um
-        What a count of ECHO2 stands for, µm.
-    """
+    """Fires the ring's sensors and reports what they hear, faults of sensors included."""
 
     def __init__(self, ring: RingConfig, sonar: Sonar, faults: FaultSchedule, rng: np.random.Generator) -> None:
         self.unit_um = range_unit_um(ring)
+        """What a count of ECHO2 stands for, µm."""
         self._sonar = FaultySonar(sonar, len(ring.mounts), faults, rng)
         self._views = ServoViews(ring)
         self._sweeps: dict[int, Sweep] = {}

@@ -44,21 +44,15 @@ class Brake:
     """Stops the base and then sets its brake, or releases it, and repeats that until the status reports it.
 
     The brake comes on when the base stands, or when it does not obey for long.
-
-    Attributes
-    ----------
-    mode
-        What is wanted.
-    is_on
-        What the last status reports; None before the first.
-    tries
-        How often the brake was released without effect.
     """
 
     def __init__(self, config: RobotConfig) -> None:
         self.mode = Mode.HELD
+        """What is wanted."""
         self.is_on: bool | None = None
+        """What the last status reports; None before the first."""
         self.tries = 0
+        """How often the brake was released without effect."""
         self._config = config
         self._round: list[Frame] = []
         """Commands of this round that are still to be sent."""
@@ -158,15 +152,11 @@ class StallMonitor:
 
     A model of the base follows the commands within the limits of its file. The base is stalled if it reports less
     than a share of what the model has done for a while: a command that has just grown says nothing yet.
-
-    Attributes
-    ----------
-    is_stalled
-        Whether the last sample shows that.
     """
 
     def __init__(self, config: RobotConfig) -> None:
         self.is_stalled = False
+        """Whether the last sample shows that."""
         self._body = config.body
         self._wanted = self._modelled = Twist(0.0, 0.0)
         """The velocity commanded, and that of the model."""

@@ -43,18 +43,13 @@ class MapFrame(OdometryFrame):
     """Poses corrected by what is recognised, and conversions between the frames.
 
     `ring`: the sensors. `models`: the objects to recognise; the round ones become landmarks.
-
-    Attributes
-    ----------
-    drift : DriftCorrection
-        The landmark filter.
-    submaps : SubmapGraph
-        The pose by maps of a few metres of way; of both, the first that refutes odometry corrects it.
     """
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig]) -> None:
         self.drift = DriftCorrection(ring)
+        """The landmark filter."""
         self.submaps = SubmapGraph(ring)
+        """The pose by maps of a few metres of way; of both, the first that refutes odometry corrects it."""
         self._near: set[int] = set()
         self.set_models(models)
 

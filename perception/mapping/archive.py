@@ -26,13 +26,6 @@ class Archive:
 
     `dtype`: of a record; its fields `number` (int), `x` and `y` (m) are used here. `row_bounds`: bounds of its
     fields.
-
-    Attributes
-    ----------
-    archived_rows : (≥ count,) record
-        The records; those from `count` on are free.
-    count : int
-        How many there are.
     """
 
     SCRATCH: Final = ("_cells", "_index")
@@ -42,7 +35,9 @@ class Archive:
     def __init__(self, dtype: np.dtype[Any], row_bounds: Fields) -> None:
         self._row_bounds = row_bounds
         self.archived_rows: Structured = np.zeros(START, dtype)
+        """(≥ count,): the records; those from `count` on are free."""
         self.count = 0
+        """How many there are."""
         self._cells: dict[tuple[int, int], list[int]] = {}
         self._index: dict[int, int] = {}
 

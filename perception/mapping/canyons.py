@@ -257,19 +257,7 @@ def places_before(surfaces: Surfaces, room_m: float) -> Floats:
 
 
 class CanyonMap:
-    """The canyons found so far, those left behind included.
-
-    Attributes
-    ----------
-    rows : (REMEMBERED_MAX,) record of `CANYON_DTYPE`
-        A number of 0 is a free row.
-    numbered, firings : int
-        Canyons numbered, and firings, so far.
-    is_wanted : bool
-        Whether to look for canyons: a place takes a millisecond, and only a drive to a goal needs them.
-    is_due : bool
-        Whether the next place is to be examined.
-    """
+    """The canyons found so far, those left behind included."""
 
     BOUNDS: Final = bounds(
         sealed_m=CONSTANT,
@@ -289,10 +277,14 @@ class CanyonMap:
     def __init__(self, sealed_m: float) -> None:
         self.sealed_m = sealed_m
         self.rows: Structured = np.zeros(CANYONS_MAX, CANYON_DTYPE)
+        """(REMEMBERED_MAX,): A number of 0 is a free row."""
         self.numbered = 0
         self.firings = 0
+        """Canyons numbered, and firings, so far."""
         self.is_wanted = False
+        """Whether to look for canyons: a place takes a millisecond, and only a drive to a goal needs them."""
         self.is_due = False
+        """Whether the next place is to be examined."""
         self._at = np.zeros(2)
 
     def observe(self, pose: Pose) -> None:

@@ -73,11 +73,6 @@ class Candidates:
         How far a cluster's centre may move at once and still be the same cluster.
     numbers : NumberSource
         Gives candidates their numbers.
-
-    Attributes
-    ----------
-    rows : (clusters_max, models) CANDIDATE
-        The candidates by cluster and model.
     """
 
     BOUNDS: Final = bounds(
@@ -106,6 +101,7 @@ class Candidates:
         self._segments_min = segments_min
         self._reach_m = reach_m
         self.rows = np.zeros((clusters_max, len(models)), CANDIDATE)
+        """(clusters_max, models): the candidates by cluster and model."""
         self._centres = np.zeros((clusters_max, 2))
         """Centres of the clusters that the candidates follow, m."""
         self._sizes = np.zeros(clusters_max, dtype=np.int64)

@@ -122,15 +122,6 @@ class Clusters:
     """The clusters of an outline map, computed again after each change of the map.
 
     `config`: the threshold T and the largest number of clusters. `capacity`: capacity of the map.
-
-    Attributes
-    ----------
-    centres : (clusters_max, 2) float
-        m; the first `count` are valid.
-    sizes : (clusters_max,) int
-        Segments in each cluster.
-    count : int
-        Number of clusters.
     """
 
     BOUNDS: Final = bounds(
@@ -148,8 +139,11 @@ class Clusters:
         self._members = np.zeros(capacity, dtype=np.int64)
         self._offsets = np.zeros(config.clusters_max + 1, dtype=np.int64)
         self.centres = np.zeros((config.clusters_max, 2))
+        """(clusters_max, 2): m; the first `count` are valid."""
         self.sizes = np.zeros(config.clusters_max, dtype=np.int64)
+        """(clusters_max,): segments in each cluster."""
         self.count = 0
+        """Number of clusters."""
 
     def apply_settings(self, config: ClustersConfig) -> bool:
         """Use another threshold T; return whether it changed. The largest number of clusters stays."""

@@ -60,11 +60,6 @@ class Placements:
 
     `models`: the models that can be placed. `config`: the paper's constants and the bound on the work. `reach_m`:
     segments up to half of this outside the model's outline attract it.
-
-    Attributes
-    ----------
-    rows : (PLACEMENTS_MAX,) PLACEMENT
-        The placements; the first `count` are valid.
     """
 
     BOUNDS: Final = bounds(
@@ -82,6 +77,7 @@ class Placements:
 
     def __init__(self, models: tuple[ObjectModel, ...], config: RelaxationConfig, reach_m: float) -> None:
         self.rows = np.zeros(PLACEMENTS_MAX, PLACEMENT)
+        """(PLACEMENTS_MAX,): the placements; the first `count` are valid."""
         self.count = 0
         self._turn = 0
         self.apply_settings(models, config, reach_m)
@@ -177,15 +173,7 @@ class Placements:
 
 
 class Rejections:
-    """Places where an operator rejected a model.
-
-    Attributes
-    ----------
-    rows : (PLACEMENTS_MAX,) REJECTION
-        The last rejections, a ring buffer.
-    total : int
-        Rejections so far.
-    """
+    """Places where an operator rejected a model."""
 
     BOUNDS: Final = bounds(
         rows={"x": PLACE, "y": PLACE, "reach": PLACE, "model": COUNT, "newest_segment": COUNT}, total=COUNT
@@ -193,7 +181,9 @@ class Rejections:
 
     def __init__(self) -> None:
         self.rows = np.zeros(PLACEMENTS_MAX, REJECTION)
+        """(PLACEMENTS_MAX,): the last rejections, a ring buffer."""
         self.total = 0
+        """Rejections so far."""
 
     def add(self, x: float, y: float, reach_m: float, model: int, newest_segment: int) -> None:
         """Add a rejection; the oldest is overwritten.

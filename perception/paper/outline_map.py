@@ -103,23 +103,6 @@ class OutlineMap:
         Half the beam's width, rad.
     turning : tuple of int
         The sensors that turn with the wheels, as `config.robot.RingConfig.turning`.
-
-    Attributes
-    ----------
-    segments : (capacity, 5) float
-        End points x1, y1, x2, y2 (m) and direction of the normal (rad), away from the sensors.
-    times : (capacity,) float
-        When each segment was completed, s.
-    status : (capacity,) int
-        `EMPTY`, `PRESENT` or `PINNED`.
-    numbers : (capacity,) int
-        Each segment's number; numbers are never reused.
-    pinned : int
-        Pinned segments.
-    start, count : int
-        Oldest slot in use, and the number of slots in use, empty ones included.
-    total : int
-        Segments ever added.
     """
 
     BOUNDS: Final = bounds(
@@ -140,13 +123,20 @@ class OutlineMap:
         self._mounts, self._turning = mounts, turning
         self._half_angle = half_angle
         self.segments = np.zeros((config.capacity, 5))
+        """(capacity, 5): end points x1, y1, x2, y2 (m) and direction of the normal (rad), away from the sensors."""
         self.times = np.zeros(config.capacity)
+        """(capacity,): when each segment was completed, s."""
         self.status = np.zeros(config.capacity, dtype=np.int64)
+        """(capacity,): `EMPTY`, `PRESENT` or `PINNED`."""
         self.numbers = np.zeros(config.capacity, dtype=np.int64)
+        """(capacity,): each segment's number; numbers are never reused."""
         self.pinned = 0
+        """Pinned segments."""
         self.start = 0
         self.count = 0
+        """Oldest slot in use, and the number of slots in use, empty ones included."""
         self.total = 0
+        """Segments ever added."""
 
     def contradiction(self) -> str | None:
         """Return why removing the oldest segments would never end, None if it does."""

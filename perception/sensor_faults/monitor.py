@@ -108,11 +108,6 @@ class SensorMonitor:
     """Removes untrustworthy readings from firings.
 
     `ring`: the sensors, and which of them should fire.
-
-    Attributes
-    ----------
-    changes : int
-        How often a sensor's faults have changed.
     """
 
     SCRATCH: Final = ("_trusted", "_possible", "_turns", "_setup", "_sensor_records", "_ring_records")
@@ -134,6 +129,7 @@ class SensorMonitor:
         mounts = mounts_array(ring.mounts)
         count = len(mounts)
         self.changes = 0
+        """How often a sensor's faults have changed."""
         self._mounts = mounts
         self._turns = np.zeros(count)
         self._turning = list(ring.turning)

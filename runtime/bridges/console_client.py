@@ -59,34 +59,23 @@ class ConsoleError(UserError):
 
 
 class ConsoleClient:
-    """One connection to a run; `connect` makes it.
-
-    Attributes
-    ----------
-    session : dict
-        The newest session message: the robot, its ring, models, settings. Empty before the first one.
-    segments : dict
-        The outline segments of the map by number: x1, y1, x2, y2 (m), direction of the normal (rad), time (s).
-    archived : list of dict
-        The objects left behind, as in a state's `objects`.
-    polylines : list of dict
-        The outlines of what is not straight, as in a state's `polylines`.
-    has_control : bool
-        Whether this client may move the robot.
-    asked_by : int or None
-        The number of the client that asks this one for control.
-    dropped : int
-        States that were not taken in time.
-    """
+    """One connection to a run; `connect` makes it."""
 
     def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
         self.session: Message = {}
+        """The newest session message: the robot, its ring, models, settings. Empty before the first one."""
         self.segments: dict[int, list[float]] = {}
+        """The outline segments of the map by number: x1, y1, x2, y2 (m), direction of the normal (rad), time (s)."""
         self.archived: list[Message] = []
+        """The objects left behind, as in a state's `objects`."""
         self.polylines: list[Message] = []
+        """The outlines of what is not straight, as in a state's `polylines`."""
         self.has_control = False
+        """Whether this client may move the robot."""
         self.asked_by: int | None = None
+        """The number of the client that asks this one for control."""
         self.dropped = 0
+        """States that were not taken in time."""
         self._socket = socket
         self._challenge: int | None = None
         """The newest challenge; None before the first."""

@@ -54,20 +54,15 @@ class Finder:
     """Collects the runs that are announced.
 
     The service named `own` is not listed.
-
-    Attributes
-    ----------
-    robots
-        The runs found, by the names of their services.
-    changed
-        Set after every change.
     """
 
     def __init__(self, network: AsyncZeroconf, own: str = "") -> None:
         from zeroconf.asyncio import AsyncServiceBrowser
 
         self.robots: dict[str, Announced] = {}
+        """The runs found, by the names of their services."""
         self.changed = asyncio.Event()
+        """Set after every change."""
         self._network, self._own = network, own
         self._tasks: set[asyncio.Task[None]] = set()
         """Look-ups under way."""

@@ -30,11 +30,6 @@ class LineSender:
         Gets what is sent, with the moment by the run's clock and by the host's.
     timed
         Wraps the call between cycles, for the statistics.
-
-    Attributes
-    ----------
-    stale_run_s
-        When the last velocity is too old to be sent, by the run's clock, s.
     """
 
     def __init__(
@@ -46,6 +41,7 @@ class LineSender:
         timed: Callable[[Callable[[], None]], Callable[[], None]],
     ) -> None:
         self.stale_run_s = -math.inf
+        """When the last velocity is too old to be sent, by the run's clock, s."""
         self._link, self._driver, self._clock, self._on_bytes = link, driver, clock, on_bytes
         self._again = timed(self._send_again)
         self._timer: asyncio.TimerHandle | None = None

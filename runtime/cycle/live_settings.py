@@ -24,15 +24,11 @@ class LiveSettings:
     """The settings in force, those before them, and who is notified of a change.
 
     `settings`: what the run starts with.
-
-    Attributes
-    ----------
-    initial : Settings
-        What the run was started with.
     """
 
     def __init__(self, settings: Settings) -> None:
         self.initial = settings
+        """What the run was started with."""
         self._current = settings
         self._history: list[Settings] = []
         self._subscribers: list[Callable[[Settings], None]] = []

@@ -98,35 +98,26 @@ class McapScanner:
     """Reader of everything readable in a file's bytes.
 
     `data`: the whole file; may be memory-mapped.
-
-    Attributes
-    ----------
-    corrupt_regions : list of CorruptRegion
-        What is damaged; complete once `chunks` is exhausted.
-    finished : bool
-        Whether the file was closed properly; known once `chunks` is exhausted.
-    profile, library : str
-        From the file's header; empty if that is unreadable.
-    is_mcap : bool
-        Whether the file starts with MCAP's magic bytes.
-    chunk_offset : int
-        Where the messages last yielded by `chunks` start in the file.
-    schemas : dict
-        The schemas in the file, by topic.
     """
 
     def __init__(self, data: memoryview) -> None:
         self._data = data
         self.corrupt_regions: list[CorruptRegion] = []
+        """What is damaged; complete once `chunks` is exhausted."""
         self.finished = False
+        """Whether the file was closed properly; known once `chunks` is exhausted."""
         self.profile = ""
         self.library = ""
+        """From the file's header; empty if that is unreadable."""
         self.is_mcap = bytes(data[:8]) == MCAP0_MAGIC
+        """Whether the file starts with MCAP's magic bytes."""
         self.chunk_offset = BEGIN
+        """Where the messages last yielded by `chunks` start in the file."""
         # This program's own channel numbers apply until the file defines others.
         self._topics = dict(enumerate(CHANNELS, start=1))
         self._schemas: dict[int, Schema] = {}
         self.schemas: dict[str, Schema] = {}
+        """The schemas in the file, by topic."""
         self._read_header()
 
     def _read_header(self) -> None:

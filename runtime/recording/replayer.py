@@ -151,13 +151,6 @@ class Replayer:
     ------
     KeyframeError
         There is no such keyframe as `start`, or its state is refused.
-
-    Attributes
-    ----------
-    state : State or None
-        As the last cycle left it; None in a gap.
-    settings_data : dict
-        The settings in force, as the recording holds them. A new object with every change.
     """
 
     def __init__(
@@ -167,7 +160,9 @@ class Replayer:
         self._skimmed = skimmed
         self._settings = recording.settings
         self.settings_data = recording.info.settings
+        """The settings in force, as the recording holds them. A new object with every change."""
         self.state: State | None = None
+        """As the last cycle left it; None in a gap."""
         self._chunk_offset = 0
         """Where the chunk of the last message starts in the file."""
         if start is None:

@@ -18,16 +18,11 @@ from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 
 class FiringReplayer:
-    """An iterator over firings, in order of time, that runs perception on each of them before it yields it.
-
-    Attributes
-    ----------
-    perception : Perception
-        With everything perceived so far.
-    """
+    """An iterator over firings, in order of time, that runs perception on each of them before it yields it."""
 
     def __init__(self, settings: Settings, firings: Iterable[Firing]) -> None:
         self.perception = Perception(settings.ring, settings.models, settings.perception)
+        """With everything perceived so far."""
         self.perception.canyon_map.is_wanted = True
         self.perception.echo_lag = None  # found as the log was opened
         self._firings = firings

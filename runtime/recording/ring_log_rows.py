@@ -75,13 +75,6 @@ class RingLogRows:
         The cross paths that get a column, (transmitter, listener).
     servos : ServoColumns, optional
         The bearings that get a column.
-
-    Attributes
-    ----------
-    count : int
-        Firings written so far.
-    dropped : int
-        Cross paths left out because they have no column.
     """
 
     def __init__(
@@ -92,7 +85,9 @@ class RingLogRows:
         self._path = path
         self._pairs = tuple(pairs)
         self.count = 0
+        """Firings written so far."""
         self.dropped = 0
+        """Cross paths left out because they have no column."""
         self._sensors = 0
         """Number of range columns; 0 before the header."""
         self._last_t = -math.inf

@@ -28,19 +28,14 @@ class ServoColumns:
     """The columns of a ring's bearings.
 
     `ring`: the ring; without servos rows pass as they are.
-
-    Attributes
-    ----------
-    sensors : tuple of int
-        Those on servos, each with a column.
-    sensor_count : int
-        Columns of ranges.
     """
 
     def __init__(self, ring: RingConfig) -> None:
         self._views = ServoViews(ring)
         self.sensors = tuple(i for i, is_on in enumerate(self._views.on_servo) if is_on)
+        """Those on servos, each with a column."""
         self.sensor_count = ring.sensor_count
+        """Columns of ranges."""
 
     @property
     def names(self) -> list[str]:

@@ -146,16 +146,11 @@ def refused_lines(refused: Sequence[str]) -> list[str]:
 
 
 class Verifier:
-    """Compares the steps of a replay with the recording.
-
-    Attributes
-    ----------
-    result : ReplayResult
-        What was found so far.
-    """
+    """Compares the steps of a replay with the recording."""
 
     def __init__(self) -> None:
         self.result = ReplayResult()
+        """What was found so far."""
         self._last: CycleRecord | None = None
 
     def check(self, found: ReplayStep, replayer: Replayer) -> None:

@@ -115,11 +115,6 @@ class RecordingWriter:
 
     `info`: the first message of each file. `host_clock`: the host's clock of the run, s, for the log time of `info`.
     `on`: whether to record from the start.
-
-    Attributes
-    ----------
-    wants_keyframe : bool
-        A keyframe is needed to continue a replay: the file is new, or messages are missing.
     """
 
     def __init__(
@@ -132,6 +127,7 @@ class RecordingWriter:
         on: bool = True,
     ) -> None:
         self.wants_keyframe = False
+        """A keyframe is needed to continue a replay: the file is new, or messages are missing."""
         self._status = RecorderStatus()
         self._target = target
         self._info = info

@@ -51,13 +51,6 @@ class BackgroundWriter(Generic[Item]):
         Items that may wait.
     close_max_s : float
         Longest wait for the queue to be written when the writer is closed, s.
-
-    Attributes
-    ----------
-    last_error : str or None
-        Why items were lost, the last time.
-    is_stuck : bool
-        Whether the thread was still writing when the writer was closed.
     """
 
     def __init__(
@@ -89,7 +82,9 @@ class BackgroundWriter(Generic[Item]):
         self._refused = self._unwritten = self._left = 0
         self._gap_written = 0
         self.last_error: str | None = None
+        """Why items were lost, the last time."""
         self.is_stuck = False
+        """Whether the thread was still writing when the writer was closed."""
 
     @property
     def lost(self) -> int:

@@ -43,19 +43,14 @@ def can_fork() -> bool:
 
 
 class ForkedChild:
-    """A child with pipes, used as `asyncio.subprocess.Process` is; `fork` starts it.
-
-    Attributes
-    ----------
-    returncode : int or None
-        Its exit code, or less than zero the signal that ended it; None while it runs.
-    """
+    """A child with pipes, used as `asyncio.subprocess.Process` is; `fork` starts it."""
 
     def __init__(
         self, pid: int, stdin: asyncio.WriteTransport, stdout: asyncio.StreamReader, stderr: asyncio.StreamReader
     ) -> None:
         self.pid, self.stdin, self.stdout, self.stderr = pid, stdin, stdout, stderr
         self.returncode: int | None = None
+        """Its exit code, or less than zero the signal that ended it; None while it runs."""
         self._ended = asyncio.Event()
         self._loop, self._descriptor = asyncio.get_running_loop(), os.pidfd_open(pid)
         self._loop.add_reader(self._descriptor, self._on_end)

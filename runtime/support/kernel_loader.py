@@ -99,11 +99,6 @@ class KernelLoader:
 
     `log`: receives a line when kernels have to be compiled. `compile_part`: compiles a part in another process.
     `preparation`: is waited for: else what it loads meanwhile would be counted twice.
-
-    Attributes
-    ----------
-    loaded : int
-        Kernel signatures loaded since the start; they are no compilation within a cycle.
     """
 
     def __init__(
@@ -117,6 +112,7 @@ class KernelLoader:
         self._compile_part = _compile_in_child if compile_part is None else compile_part
         self._lock = asyncio.Lock()
         self.loaded = 0
+        """Kernel signatures loaded since the start; they are no compilation within a cycle."""
 
     async def __call__(self, running: Settings, proposed: Settings) -> str | None:
         """Load what the proposed settings need beyond the running ones; return None, or why that failed."""
@@ -149,15 +145,6 @@ class KernelPreparation:
     Another process compiles what never was, at low priority; then a thread loads all. The emulator runs uncompiled
     meanwhile; its kernels are compiled last, for the next start.
     `parts`: those of `PARTS` that the run needs, the emulator's among them if it has one. `host_clock`: monotonic, s.
-
-    Attributes
-    ----------
-    progress : str
-        How many kernels are compiled, and how long the rest will take, or how far loading is.
-    first_start : str or None
-        What the user should know before a first start, in which nothing is shown for seconds; None otherwise.
-    is_over : asyncio.Event
-        Set by the process once recognition runs with what is loaded, or loading has failed.
     """
 
     def __init__(self, parts: Sequence[str], host_clock: Callable[[], float] = time.monotonic) -> None:
@@ -168,13 +155,16 @@ class KernelPreparation:
         self._host_clock = host_clock
         self._begin_host_s = host_clock()
         self.first_start = FIRST_START if uncompiled_parts(self._folder, [RING]) else None
+        """What the user should know before a first start, in which nothing is shown for seconds; None otherwise."""
         self.progress = f"{RING_WAIT}: they are being loaded" if self.first_start is None else RING_WAIT
+        """How many kernels are compiled, and how long the rest will take, or how far loading is."""
         self._process: asyncio.subprocess.Process | None = None
         self._output: asyncio.Task[tuple[bytes, bytes]] | None = None
         """Reads what the process writes: behind a full pipe it would wait for ever."""
         self._ring: asyncio.Task[None] | None = None
         self._is_closed = False
         self.is_over = asyncio.Event()
+        """Set by the process once recognition runs with what is loaded, or loading has failed."""
 
     def begin_ring(self, settings: Settings) -> asyncio.Task[None]:
         """Begin to load what `ring` waits for, and return the task; it is started only once."""

@@ -23,13 +23,6 @@ class SdNotifier:
 
     `address`: path of the socket, or its abstract name after an ``@``. `watchdog_s`: timeout of the manager's
     watchdog; None without a watchdog.
-
-    Attributes
-    ----------
-    lost : int
-        Messages that could not be sent.
-    last_error : str or None
-        Why, the last time.
     """
 
     def __init__(self, address: str | None = None, watchdog_s: float | None = None) -> None:
@@ -39,7 +32,9 @@ class SdNotifier:
         self._is_ready = False
         self._status: str | None = None
         self.lost = 0
+        """Messages that could not be sent."""
         self.last_error: str | None = None
+        """Why, the last time."""
         self._socket: socket.socket | None = None
         if self._address:
             self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)

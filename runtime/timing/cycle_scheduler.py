@@ -33,15 +33,6 @@ class CycleScheduler:
 
     `settings`: rate, firing step, and the limit on overruns. `clock`: the run's, or any monotonic clock, s.
     `callbacks`: names of the callbacks that `timing_monitor` will measure.
-
-    Attributes
-    ----------
-    stats : CycleStats
-        Durations and lateness of all cycles.
-    timing_monitor : TimingMonitor
-        Measures the phases of each cycle and the callbacks between two.
-    gaps : CycleGaps
-        Runs work in threads that rest in cycles.
     """
 
     def __init__(self, settings: Settings, clock: Callable[[], float], callbacks: tuple[str, ...] = ()) -> None:
@@ -56,10 +47,13 @@ class CycleScheduler:
         self._stall_sampler = StallSampler()
         self._pacer: Pacer | None = None
         self.gaps = CycleGaps()
+        """Runs work in threads that rest in cycles."""
         self.stats = CycleStats(LATE_SHARE * self._period_s, is_touched=True)
+        """Durations and lateness of all cycles."""
         self.timing_monitor = TimingMonitor(
             self.stats, sampler.read, lambda: self._stall_sampler.sample, callbacks, sampler.read_after
         )
+        """Measures the phases of each cycle and the callbacks between two."""
 
     @contextmanager
     def start(self, run_s: float, gap_max_s: float) -> Iterator[None]:

@@ -40,16 +40,12 @@ class MemoryPolicy:
     """Decides when garbage is collected, and counts collections.
 
     `collect`: collects the objects of a generation and of the younger ones.
-
-    Attributes
-    ----------
-    collections : list of int
-        Collections while driving, of each generation, also those that others requested.
     """
 
     def __init__(self, collect: Callable[[int], object] = gc.collect) -> None:
         self._collect = collect
         self.collections = [0] * GENERATIONS
+        """Collections while driving, of each generation, also those that others requested."""
         self._cycles = 0
         self._old_cycles = 0
         self._settled = False

@@ -74,13 +74,6 @@ class ScaledClock(RunClock):
     """A clock that shares its time scale with the emulator, and never passes the time that the emulator has reached.
 
     `host`: monotonic, s; the emulator's as well. `send`: sends each new time scale to the emulator.
-
-    Attributes
-    ----------
-    time_scale
-        The one in force.
-    factor
-        Speed of time relative to real time, now or after the pause.
     """
 
     def __init__(
@@ -89,7 +82,9 @@ class ScaledClock(RunClock):
         super().__init__(host)
         self.send = send
         self.time_scale: TimeScale = REAL_TIME
+        """The one in force."""
         self.factor = 1.0
+        """Speed of time relative to real time, now or after the pause."""
         self._limit_run_s = math.inf
         """The run's time never passes this: where the emulator has acknowledged its time, or time was resumed."""
         self._acknowledged_run_s = -math.inf

@@ -140,18 +140,13 @@ class DriftEvidence:
     """The filter that takes odometry as exact, and what the readings say against it.
 
     `ring`: the sensors.
-
-    Attributes
-    ----------
-    exact : LandmarkTracker
-        The filter; it has the landmarks of the one with drift, in the same order, until odometry is refuted.
-    is_refuted : bool
-        Whether odometry drifts; remains so.
     """
 
     def __init__(self, ring: RingConfig) -> None:
         self.exact = LandmarkTracker(ring, is_exact=True)
+        """The filter; it has the landmarks of the one with drift, in the same order, until odometry is refuted."""
         self.is_refuted = False
+        """Whether odometry drifts; remains so."""
 
     def reset(self) -> None:
         """Start again with the next firing."""

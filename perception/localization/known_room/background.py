@@ -35,11 +35,6 @@ class Background:
 
     `room`: the surfaces. `surroundings`: of this room. `clear_m`: the ring's centre is farther than this from any
     surface, m.
-
-    Attributes
-    ----------
-    heard_share : float
-        Share of this ring's readings that hear something, as learned so far.
     """
 
     SCRATCH: Final = ("_densities", "_window_m")
@@ -50,6 +45,7 @@ class Background:
         self._window_m = float(surroundings.sensor[0].window_m)
         self._densities = _range_densities(room, surroundings, clear_m)
         self.heard_share = HEARD_PRIOR
+        """Share of this ring's readings that hear something, as learned so far."""
 
     def reset(self) -> None:
         """Forget how often the sensors hear something."""

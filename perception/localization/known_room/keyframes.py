@@ -29,19 +29,6 @@ class Keyframes:
     """The last keyframes of a run, each under its number modulo `KEYFRAMES_MAX`.
 
     `mounts`, shape (n, 3): place (m) and direction (rad) of each sensor in the ring's frame.
-
-    Attributes
-    ----------
-    count : int
-        Keyframes since the start.
-    odometry : (KEYFRAMES_MAX, 3) float
-        The ring's pose at each keyframe's end by odometry, m and rad.
-    way_m : (KEYFRAMES_MAX,) float
-        Way driven until then.
-    readings : (KEYFRAMES_MAX, n, COLUMNS) float
-        As of `perception.localization.known_room.particle_update`.
-    counts : (KEYFRAMES_MAX,) int
-        Readings of each.
     """
 
     SCRATCH: Final = ("_axes",)
@@ -68,10 +55,15 @@ class Keyframes:
         self._is_started = self._has_stood = False
         self._begin = np.zeros(3)
         self.count = 0
+        """Keyframes since the start."""
         self.odometry = np.zeros((KEYFRAMES_MAX, 3))
+        """(KEYFRAMES_MAX, 3): the ring's pose at each keyframe's end by odometry, m and rad."""
         self.way_m = np.zeros(KEYFRAMES_MAX)
+        """(KEYFRAMES_MAX,): way driven until then."""
         self.readings = np.zeros((KEYFRAMES_MAX, len(mounts), COLUMNS))
+        """(KEYFRAMES_MAX, n, COLUMNS): as of `perception.localization.known_room.particle_update`."""
         self.counts = np.zeros(KEYFRAMES_MAX, dtype=np.int64)
+        """(KEYFRAMES_MAX,): readings of each."""
 
     def observe(self, firing: Firing) -> bool:
         """Take a firing with its pose by odometry; return whether a keyframe ends with it."""

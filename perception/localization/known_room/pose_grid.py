@@ -204,11 +204,6 @@ class PoseGrid:
 
     `room`: the surfaces. `surroundings`: of this room. `clear_m`: the ring's centre is farther than this from any
     surface, m.
-
-    Attributes
-    ----------
-    starts : (1,) Starts
-        What the last search found.
     """
 
     SCRATCH: Final = ("_origin", "_table", "_free", "_filled", "_scratch", "_likely", "_likely_search", "starts")
@@ -242,6 +237,7 @@ class PoseGrid:
         self._found = zeros(Starts, 1)
         self._found["least"] = -math.inf
         self.starts = records(Starts, self._found)
+        """(1,): what the last search found."""
         self._scratch = records(ScoreScratch, zeros(ScoreScratch, 1))
         self._readings = np.zeros((GRID_READINGS_MAX, COLUMNS))
         self._count = self._searches = 0

@@ -108,21 +108,15 @@ def is_covered(rows: Structured, by: Structured) -> NDArray[np.bool_]:
 
 
 class SurfaceList:
-    """Rows of surfaces.
-
-    Attributes
-    ----------
-    archived_rows : (n,) record of Surface
-        All of them.
-    numbered : int
-        Pieces and polylines that have got a number.
-    """
+    """Rows of surfaces."""
 
     BOUNDS: Final = bounds(archived_rows=Surface.BOUNDS, numbered=COUNT)
 
     def __init__(self) -> None:
         self.archived_rows = zeros(Surface, 0)
+        """(n,): all of them."""
         self.numbered = 0
+        """Pieces and polylines that have got a number."""
 
     @property
     def left_behind(self) -> Structured:

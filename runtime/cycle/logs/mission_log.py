@@ -41,16 +41,11 @@ class MissionRow(TypedDict):
 
 
 class MissionLog:
-    """Logs how a mission goes on.
-
-    Attributes
-    ----------
-    row
-        The last mission, for the summary; None if there was none.
-    """
+    """Logs how a mission goes on."""
 
     def __init__(self, log: FilteringBoundLogger) -> None:
         self.row: MissionRow | None = None
+        """The last mission, for the summary; None if there was none."""
         self._log = log
         self._last: tuple[str, int, str] | None = None
         self._begin_run_s: float | None = None

@@ -27,29 +27,22 @@ NUMBER: Final = re.compile(r"\d+(\.\d+)?")
 
 
 class ModeLog:
-    """Logs each mode that is entered, and reports it to the service manager.
-
-    Attributes
-    ----------
-    stop_reasons
-        Of the newest stops, and of lines that were lost in READY, in order: each reason that a stop had, but that the
-        line is back. What a start waits for is no stop.
-    hold_reasons
-        Why the robot held in DRIVE for `HELD_S` or more, in order.
-    missions
-        How missions go on.
-    """
+    """Logs each mode that is entered, and reports it to the service manager."""
 
     def __init__(self, log: FilteringBoundLogger, notifier: SdNotifier) -> None:
         self.stop_reasons: list[str] = []
+        """Of the newest stops, and of lines that were lost in READY, in order: each reason that a stop had, but that
+        the line is back. What a start waits for is no stop."""
         self._has_started = False
         """Whether the robot has been in another mode than CONNECTING."""
         self._kept = set[str]()
         """Those of the present stop, without their numbers."""
         self.missions = MissionLog(log)
+        """How missions go on."""
         self._log = log
         self._notifier = notifier
         self.hold_reasons: list[str] = []
+        """Why the robot held in DRIVE for `HELD_S` or more, in order."""
         self._held: str | None = None
         self._held_run_s: float | None = None
         self._is_logged = False
