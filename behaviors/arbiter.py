@@ -151,11 +151,7 @@ def limit_velocity(
     not limited: it needs no room.
     `requested`: the velocity; its v divided by the base velocity is the request's vector along the heading.
     `responses`, `percept`, `body`, `config`, `expected`: as for `arbitrate`.
-
-    Returns
-    -------
-    Decision
-        `Drive` with abs(v) ≤ `speed_max_m_s` and abs(w) ≤ `turn_max_rad_s`, both finite; or `Stop`.
+    Returned: `Drive` with abs(v) ≤ `speed_max_m_s` and abs(w) ≤ `turn_max_rad_s`, both finite; or `Stop`.
     """
     error = _input_error(responses, percept, expected)
     if error is not None:

@@ -143,11 +143,7 @@ def half_paths_over_circle(t: np.ndarray, listener: np.ndarray, centre: complex,
     """Return half the shortest way over a circle between pairs of points outside it (Alhazen's problem).
 
     `t`, `listener`: the points as complex numbers, shape (n,), m. `centre`, `radius_m`: the circle, m.
-
-    Returns
-    -------
-    (n,) float
-        Where the circle parts the points, the way over the point that is least wrong.
+    Returned, shape (n,): where the circle parts the points, the way over the point that is least wrong.
     """
     a, b = t - centre, listener - centre
     from_t, from_l = np.maximum(abs(a), radius_m), np.maximum(abs(b), radius_m)

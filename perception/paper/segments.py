@@ -53,12 +53,8 @@ def tangent(
     direction α of n, with L and φ the length and direction of P2 − P1 (McKerrow 1993; paper §3.2, Figure 2).
     `x1`, `y1`, `axis1`, `r1`: first reading: place of the sensor (m), direction of its axis (rad), range (m). `x2`,
     `y2`, `axis2`, `r2`: second reading. `half_angle`: half the beam's width, rad: the arcs end there.
-
-    Returns
-    -------
-    (bool, float)
-        Whether a tangent touches both arcs inside both beams, and the direction of its normal, from the sensors
-        to the surface (rad). If both roots do, the one nearer to the axes.
+    Returned: whether a tangent touches both arcs inside both beams, and the direction of its normal, from the sensors
+    to the surface (rad). If both roots do, the one nearer to the axes.
     """
     baseline = math.hypot(x2 - x1, y2 - y1)
     if baseline == 0.0 or abs(r1 - r2) > baseline:

@@ -62,11 +62,7 @@ def neighbours_of(axes: Floats, turning: tuple[int, ...] = ()) -> Ints:
 
     `axes`, shape (n,): direction of each sensor in the ring, rad. `turning`: the sensors that turn with the wheels:
     none of them is the neighbour of one that does not.
-
-    Returns
-    -------
-    (n, 2) int
-        Indices of the neighbours, −1 twice for a sensor that has not two.
+    Returned, shape (n, 2): indices of the neighbours, −1 twice for a sensor that has not two.
     """
     neighbours: Ints = np.full((len(axes), 2), -1, np.int64)
     turns = np.isin(np.arange(len(axes)), turning)

@@ -178,10 +178,7 @@ class RotatingFolder:
     def enforce_limits(self, current: Path) -> str | None:
         """Remove the file that the last check named if the folder exceeds a limit, but never `current`.
 
-        Returns
-        -------
-        str or None
-            What goes next and how to keep it, once the folder comes within a tenth of a limit.
+        Returned: what goes next and how to keep it, once the folder comes within a tenth of a limit.
         """
         files = self._counted_files()
         if self._fill(files) > 1.0 and self._announced is not None:

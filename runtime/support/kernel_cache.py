@@ -135,10 +135,7 @@ def _is_ours(folder: Path) -> bool:
 def use_kernel_cache() -> Path:
     """Set numba's cache folder, unless the environment names one; call this before importing numba.
 
-    Returns
-    -------
-    Path
-        The folder in it that says which parts of these sources are compiled.
+    Returned: the folder in it that says which parts of these sources are compiled.
     """
     kernels = os.environ.get("NUMBA_CACHE_DIR")
     if not kernels:  # numba takes an empty one for none, too

@@ -60,11 +60,7 @@ def ray_over_circle(
     axis, with φ half the beam's opening.
     `q`, `half_angle`, `rays`: as for `nearest_ray`. `dx`, `dy`, `d`: the circle's centre from the sensor, and its
     distance, m. `radius`: m.
-
-    Returns
-    -------
-    (float, float, float, float)
-        Range, m; its derivatives by the centre; d times the cosine of the angle off the axis.
+    Returned: range, m; its derivatives by the centre; d times the cosine of the angle off the axis.
     """
     ux, uy = nearest_ray(q, dx, dy, half_angle, rays)
     along = ux * dx + uy * dy

@@ -42,11 +42,7 @@ def over_circle(q: Reading, dx: float, dy: float, radius: float) -> tuple[float,
     two directions, weighted by distance, a step of Newton's method goes to within microradians of it; what is left
     of the way is of second order and taken off. The error is below .1 µm from 10 cm on.
     `q`: a cross path. `dx`, `dy`: the circle's centre from the transmitter, m. `radius`: m; 0 is an edge.
-
-    Returns
-    -------
-    (float, float, float)
-        Half the way, m, and its derivatives.
+    Returned: half the way, m, and its derivatives.
     """
     ax, ay = -dx, -dy
     bx, by = q.listener_x - dx, q.listener_y - dy

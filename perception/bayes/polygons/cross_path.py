@@ -58,11 +58,7 @@ def predict_cross(
     the shortest way scatters. As a cone each side also answers where the transmitter's beam ends on it.
     `q`: a cross path. `x`, `y`, `c`, `s`: the polygon's place (m), and cosine and sine of its heading. `sides`,
     `is_closed`, `p`: as for `likelihood.predict`.
-
-    Returns
-    -------
-    (float, float, float)
-        Half the way over a mirror (m, `NO_ANSWER_M` where none), its price (nat), and that over a cone (m).
+    Returned: half the way over a mirror (m, `NO_ANSWER_M` where none), its price (nat), and that over a cone (m).
     """
     dx, dy = q.x - x, q.y - y
     tx, ty = c * dx + s * dy, c * dy - s * dx

@@ -135,12 +135,8 @@ def touch(wall: Wall, q: Reading, p: SettingsRecord, least: float) -> tuple[int,
     """Return where a reading would touch a wall without ends.
 
     `least`: least cosine between the sensor's axis and the normal.
-
-    Returns
-    -------
-    (int, float, float, float)
-        `FOOT`, `BEAM_EDGE` or `NOWHERE`; the range, m; the position along the wall, m; the cosine between the
-        sensor's axis and the normal.
+    Returned: `FOOT`, `BEAM_EDGE` or `NOWHERE`; the range, m; the position along the wall, m; the cosine between the
+    sensor's axis and the normal.
     """
     nx, ny = wall_normal(wall)
     dot = nx * q.axis_x + ny * q.axis_y

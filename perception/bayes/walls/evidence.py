@@ -152,12 +152,8 @@ def flatness(wall: Wall, first: int, end: int, p: SettingsRecord) -> tuple[float
     """Return the evidence for a line against a circle in the best place, and how well the line fits.
 
     `first`, `end`: the spans compared, end excluded.
-
-    Returns
-    -------
-    (float, float)
-        χ² of the circle less χ² of the line, and χ² of the line for each degree of freedom, each bin's bounded: a few
-        echoes of other surfaces do not make a long line crooked.
+    Returned: χ² of the circle less χ² of the line, and χ² of the line for each degree of freedom, each bin's bounded:
+    a few echoes of other surfaces do not make a long line crooked.
     """
     line, n = line_chi2(wall, first, end)
     if n < FLAT_BINS_MIN:

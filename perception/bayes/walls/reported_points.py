@@ -68,11 +68,7 @@ def reach_corners(walls: dict[int, Straight], corners: Structured, are_mirrors: 
     an inside corner answers from afar, and elsewhere only an edge: that one is sure whatever is known of its walls.
     `walls`: the walls by their number; their ends are updated. `corners`, shape (n,): all corners. `are_mirrors`:
     whether the walls are known to be mirrors.
-
-    Returns
-    -------
-    list of tuple
-        The corners that are sure, as `CornerPoint` has them.
+    Returned: the corners that are sure, as `CornerPoint` has them.
     """
     found = []
     for corner in corners[corners["is_used"] == 1]:
@@ -112,11 +108,7 @@ def end_at_edges(walls: dict[int, Straight], edges: Structured, are_mirrors: boo
 
     `walls`: the walls by their number; their ends are updated. `edges`, shape (n,): all edges. `are_mirrors`: whether
     the walls are known to be mirrors; an edge is heard from near then.
-
-    Returns
-    -------
-    list of tuple
-        The edges that are sure, as `CornerPoint` has them.
+    Returned: the edges that are sure, as `CornerPoint` has them.
     """
     found = []
     for edge in edges[edges["is_used"] == 1]:

@@ -119,11 +119,7 @@ def straighten(walls: dict[int, Straight], corners: Structured, edges: Structure
 
     `walls`: the walls by their number; their lines are updated. `corners`, `edges`, shape (n,): all corners and
     edges.
-
-    Returns
-    -------
-    tuple of (n,) record of `RoomCorner`
-        The corners and the edges, with their corrected places.
+    Returned: the corners and the edges, with their corrected places.
     """
     points = np.concatenate([corners, edges])
     ends = points[len(corners) :]["second"].copy()

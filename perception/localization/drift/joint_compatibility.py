@@ -134,11 +134,7 @@ def share_improved(found: Displacement, echoes: Sequence[Echo], discs: Sequence[
     After a slip that is most of them; where only some landmarks have moved, a displacement may fit these a little
     better, and the others no better.
     `found`: of these echoes and landmarks. `echoes`, `discs`, `half_angle`: as for `find_displacement`.
-
-    Returns
-    -------
-    float
-        As a share of the paired landmarks.
+    Returned: as a share of the paired landmarks.
     """
     nearest = _nearest(echoes)
     gains: dict[int, float] = {}

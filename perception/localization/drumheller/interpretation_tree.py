@@ -130,11 +130,7 @@ def poses_along_walls(segments: Sequence[ContourSegment], room: Room) -> Floats:
     """Return poses from which one segment is on one wall: what remains where the tree finds no two walls.
 
     `segments`: each is put on each side of each wall that is long enough. `room`: the walls.
-
-    Returns
-    -------
-    (n, 3) float
-        x, y (m), heading (rad): the middle of the segment is at each `SLIDE_M` of the wall.
+    Returned, shape (n, 3): x, y (m), heading (rad): the middle of the segment is at each `SLIDE_M` of the wall.
     """
     sides = _sides(room)
     rows = [np.empty((0, 3))]

@@ -306,11 +306,7 @@ class PoseGrid:
         """Return the poses that fit best, the best first, without those that fit much worse.
 
         `most`: so many at most.
-
-        Returns
-        -------
-        (n, 3) float
-            x, y (m), heading (rad).
+        Returned, shape (n, 3): x, y (m), heading (rad).
         """
         found = self._found["starts"][0, : len(self)]
         order = np.argsort(-found["score"], kind="stable")[:most]

@@ -238,11 +238,7 @@ def expect_cone(s: Surroundings, x: float, y: float, cos: float, sin: float) -> 
     """Return the distance (m) of the nearest point in a beam, and its derivative by the sensor's x and y.
 
     `s`: of a place near the sensor. `x`, `y`, `cos`, `sin`: the sensor's place, m, and axis.
-
-    Returns
-    -------
-    tuple of float
-        inf, 0, 0 for silence.
+    Returned: inf, 0, 0 for silence.
     """
     near, slope = s.near[0], s.sensor[0].tan_half
     off = math.hypot(x - near.x, y - near.y)

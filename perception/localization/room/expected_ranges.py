@@ -189,12 +189,8 @@ def mirror_points(room: Room, x: Floats, y: Floats) -> tuple[Floats, Floats, Flo
     """Return the points that reflect sound back to some places, whatever hides them.
 
     `room`: the surfaces. `x`, `y`, shape (n,): places, m.
-
-    Returns
-    -------
-    (float, float, float)
-        Each point from the place, dx and dy, and its distance, m, shape (n, walls + corners + circles); the distance
-        is inf where the wall, corner or circle reflects nothing back.
+    Returned: each point from the place, dx and dy, and its distance, m, shape (n, walls + corners + circles); the
+    distance is inf where the wall, corner or circle reflects nothing back.
     """
     x, y = x[:, None], y[:, None]
     height = room.offsets - room.normals[:, 0] * x - room.normals[:, 1] * y

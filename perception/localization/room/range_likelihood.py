@@ -53,11 +53,8 @@ def log_ratio(model: RangeModel, measured: Floats, expected: Floats) -> tuple[Fl
 
     `model`: errors. `measured`, `expected`: ranges, m, arrays of shapes that broadcast; inf for silence. An expected
     range beyond the window is silence.
-
-    Returns
-    -------
-    (float, float)
-        The log ratio; and the probability that a heard echo is the expected one (0 for silence): the weight in a fit.
+    Returned: the log ratio; and the probability that a heard echo is the expected one (0 for silence): the weight in
+    a fit.
     """
     heard, answers = np.isfinite(measured), expected <= model.window_m
     both = heard & answers

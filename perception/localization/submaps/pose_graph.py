@@ -193,11 +193,7 @@ def go_on(links: Records[Link], count: int, jacobians: Floats, vectors: Floats, 
 
     `links`, `count`, `jacobians`, `vectors`: as of `begin_step`; the vectors are updated. `iterations`: how many at
     most.
-
-    Returns
-    -------
-    float
-        The norm of what is left, by the inverse of the diagonal.
+    Returned: the norm of what is left, by the inverse of the diagonal.
     """
     step, left, direction, product, diagonal, scaled = (
         vectors[0],

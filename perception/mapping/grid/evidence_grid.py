@@ -158,11 +158,7 @@ class EvidenceGrid:
 
         `holding`, shape (n, n): the cells that hold something, row by row from the smallest y. `firings`: the
         firings, each with its `bearings` and its `place`.
-
-        Returns
-        -------
-        (n, n) bool
-            As `holding`.
+        Returned, shape (n, n): as `holding`.
         """
         lines, holds = SightLines(self.window, self.ring), self.window.rolled(holding)
         for firing, bearings, place in firings:
