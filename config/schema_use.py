@@ -64,6 +64,3 @@ SHIPPED_USES: Final[Mapping[str, type[Use]]] = MappingProxyType(
     {get_args(use.model_fields["name"].annotation)[0]: use for use in get_args(get_args(SchemaUse)[0])}
 )
 """The settings of each shipped schema by its name."""
-
-HELPERS: Final = tuple(name for name, use in SHIPPED_USES.items() if not use.leads)
-"""Shipped schemas that lead nowhere by themselves."""

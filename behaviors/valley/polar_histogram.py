@@ -32,7 +32,6 @@ NO_PART: Final = np.empty((0, 0), np.float32)
 
 Sectors: TypeAlias = NDArray[np.bool_]
 """A flag for each sector, shape (SECTORS,) or, of several discs, (n, SECTORS)."""
-ALL_FREE: Final = bytes(SECTORS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,7 +18,6 @@ from perception.bayes.walls.fit import WALL_WEIGHT_MIN
 from perception.bayes.walls.numbers import SPAN_MIN_M
 from perception.bayes.walls.reported_points import EVIDENCE_MAX_NAT, end_at_edges, reach_corners
 from perception.bayes.walls.straight import Straight, kept_bins, straight, straighten
-from perception.kernel import Floats
 from perception.records import Record, Structured
 
 WALL_CHI2_MIN: Final = 40.0
@@ -73,11 +72,6 @@ class CornerPoint(Record):
     """1 where it juts out, 0 for an inside corner."""
     echoes: float
     log_odds: float
-
-
-def wall_segments(memory: Memory) -> Structured:
-    """Return the walls that are sure, one segment for each span, as records of `WallSegment`, shape (n,)."""
-    return room_report(memory)[0]
 
 
 def room_report(memory: Memory) -> tuple[Structured, Structured]:
@@ -214,9 +208,3 @@ def kept_spans(spans: Structured, kept: NDArray[np.bool_], numbers: Structured) 
             spans["number"][k] = np.setdiff1d(numbers[first:end], spans["number"]).max(initial=0)
         are_kept[k] = kept[first:end].any() and spans["number"][k] > 0
     return are_kept
-
-
-def wall_ends(memory: Memory) -> Floats:
-    """Return the ends x, y, x, y (m) of the walls that are sure, shape (n, 4)."""
-    segments = wall_segments(memory)
-    return np.column_stack([segments[name] for name in ("x1", "y1", "x2", "y2")])

@@ -76,7 +76,7 @@ class PoseCandidate:
 
 
 def localize(
-    firings: Sequence[Firing], room: Room, ring: RingConfig, reflection: Reflection, model: RangeModel | None = None
+    firings: Sequence[Firing], room: Room, ring: RingConfig, reflection: Reflection
 ) -> tuple[PoseCandidate, ...]:
     """Return where in a room the ring may be, without knowing where it was before.
 
@@ -90,8 +90,6 @@ def localize(
         Places and beam of the sensors.
     reflection : str
         How the room reflects: `cone` or `specular`.
-    model : RangeModel, optional
-        Errors of a range; by default those of this ring with 1 % noise.
 
     Returns
     -------
@@ -106,7 +104,7 @@ def localize(
     """
     if not firings:
         raise ValueError("expected at least one firing")
-    model = RangeModel.of_ring(ring) if model is None else model
+    model = RangeModel.of_ring(ring)
     half_angle = math.radians(ring.beam_half_angle_deg)
     parts = panoramas(firings, ring)
     stand = Stand(room, all_readings(parts), half_angle, reflection, model)

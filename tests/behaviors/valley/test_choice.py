@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from behaviors.valley.choice import apart, candidates, cheapest, gaps, valleys
-from behaviors.valley.polar_histogram import ALL_FREE, SECTORS
+from behaviors.valley.polar_histogram import SECTORS
 from config.behaviors import FollowValleyConfig
 
+ALL_FREE = bytes(SECTORS)
 CONFIG = FollowValleyConfig()
 
 

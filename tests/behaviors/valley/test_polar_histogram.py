@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from behaviors.valley.polar_histogram import (
-    ALL_FREE,
+    SECTORS,
     Cells,
     Sectors,
     blocked_sectors,
@@ -24,6 +24,7 @@ from runtime.support.kernel_cache import compiled_signatures
 from tests import naive_valley
 from tests.behaviors.valley.windows import at
 
+ALL_FREE = bytes(SECTORS)
 CONFIG = FollowValleyConfig(block_m=1.0, free_m=1.3, occupied_probability=0.6, sure_probability=0.8)
 
 

@@ -12,6 +12,7 @@ from perception.bayes.memory.state import CircleTrack, Memory
 from perception.bayes.memory.wall_records import IS_FREE, MAX_WALLS, Wall, WallMap
 from perception.bayes.walls.bins import HALF
 from perception.bayes.walls.fit import fit_walls
+from perception.bayes.walls.report import room_report
 from perception.records import records, zeros
 from tests.naive_walls import Array
 from tests.perception.bayes.random_tracks import P, S, new_memory
@@ -91,3 +92,9 @@ def remember_free(room: WallMap, rows: Array) -> None:
         q.x, q.y, q.axis_x, q.axis_y, q.range_m = x, y, math.cos(axis), math.sin(axis), range_m
         room.recent[k].is_free = IS_FREE
     room.recent_count = len(rows)
+
+
+def wall_ends(memory: Memory) -> Array:
+    """Return the ends x, y, x, y (m) of the walls that are sure, shape (n, 4)."""
+    segments, _ = room_report(memory)
+    return np.column_stack([segments[name] for name in ("x1", "y1", "x2", "y2")])

@@ -11,7 +11,7 @@ from perception.bayes.walls import evidence as wall_evidence
 from perception.bayes.walls.bins import enter_reading, free
 from perception.bayes.walls.contact import FOOT
 from perception.bayes.walls.fit import fit_walls
-from perception.bayes.walls.report import wall_segments
+from perception.bayes.walls.report import room_report
 from tests import naive_walls
 from tests.perception.bayes.random_tracks import P, examples
 from tests.perception.bayes.rooms import fill, new_room, place_wall, reading, refit, spans
@@ -59,7 +59,7 @@ def test_a_few_echoes_of_other_surfaces_do_not_make_a_long_wall_crooked() -> Non
     fit_walls(memory.s, P, 0, 1, 1)
     assert wall.span_count == 1
     assert 0.5 < wall.misfit < 1.5
-    assert len(wall_segments(memory)) == 1
+    assert len(room_report(memory)[0]) == 1
 
 
 def test_a_long_flat_line_has_evidence_and_a_drums_tangent_has_none() -> None:

@@ -10,9 +10,8 @@ import pytest
 from perception.bayes.memory.state import ESTABLISHED
 from perception.bayes.memory.wall_records import IS_FREE, IS_KNOWN
 from perception.bayes.walls import merging as wall_merging
-from perception.bayes.walls.report import wall_ends
 from tests.perception.bayes.random_tracks import P
-from tests.perception.bayes.rooms import SIGMA, fill, new_room, place_wall, refit, spans
+from tests.perception.bayes.rooms import SIGMA, fill, new_room, place_wall, refit, spans, wall_ends
 
 
 @pytest.mark.parametrize(("turn", "shift", "is_one"), [(0.002, 0.005, True), (0.3, 0.0, False), (0.0, 0.2, False)])

@@ -10,8 +10,8 @@ import pytest
 from perception.bayes.memory.state import ESTABLISHED
 from perception.bayes.reports.object_report import wall_object
 from perception.bayes.walls.bins import free
-from perception.bayes.walls.report import wall_ends, wall_segments
-from tests.perception.bayes.rooms import fill, new_room, place_wall
+from perception.bayes.walls.report import room_report
+from tests.perception.bayes.rooms import fill, new_room, place_wall, wall_ends
 
 
 def test_each_wall_needs_evidence_and_the_first_one_weight_as_well() -> None:
@@ -23,11 +23,11 @@ def test_each_wall_needs_evidence_and_the_first_one_weight_as_well() -> None:
     for first, second, reported in ((39.0, 39.0, 0), (41.0, 41.0, 2), (41.0, 39.0, 1)):
         for wall, chi2 in zip(room.walls, (first, second), strict=False):
             wall.chi2 = wall.spans[0].chi2 = chi2
-        assert len(wall_segments(memory)) == reported
+        assert len(room_report(memory)[0]) == reported
     room.walls[0].spans[0].chi2 = room.walls[1].spans[0].chi2 = 41.0
     for first, second, reported in ((13.0, 11.0, 2), (11.0, 11.0, 0)):
         room.walls[0].spans[0].weight, room.walls[1].spans[0].weight = first, second
-        assert len(wall_segments(memory)) == reported
+        assert len(room_report(memory)[0]) == reported
 
 
 def test_a_short_span_in_line_with_a_long_one_is_evidence_with_it() -> None:
@@ -42,7 +42,7 @@ def test_a_short_span_in_line_with_a_long_one_is_evidence_with_it() -> None:
     assert wall.span_count == 2
     for weight, reported in ((4.0, 1), (6.0, 2)):
         wall.spans[1].weight = weight
-        assert len(wall_segments(memory)) == reported
+        assert len(room_report(memory)[0]) == reported
 
 
 def test_a_short_wall_that_touches_a_named_drum_is_its_side() -> None:
@@ -50,13 +50,13 @@ def test_a_short_wall_that_touches_a_named_drum_is_its_side() -> None:
     place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
     fill(memory, room.walls[0], -2.0, -0.5)
     fill(memory, room.walls[0], 0.5, 0.98)
-    assert len(wall_segments(memory)) == 2
+    assert len(room_report(memory)[0]) == 2
     drum = memory.tracks[0]
     drum.status, drum.is_named, drum.radius = ESTABLISHED, 1, 0.3
     drum.x, drum.y = 2.3, 0.74
-    assert wall_segments(memory)["y2"] == pytest.approx([-0.5], abs=0.1)
+    assert room_report(memory)[0]["y2"] == pytest.approx([-0.5], abs=0.1)
     drum.x = 2.5  # stands behind it
-    assert len(wall_segments(memory)) == 2
+    assert len(room_report(memory)[0]) == 2
 
 
 def test_short_light_and_bent_lines_are_no_walls() -> None:
@@ -97,7 +97,7 @@ def test_a_segment_is_an_object_with_its_length_in_its_covariance() -> None:
     memory, room = new_room()
     place_wall(room.walls[0], np.zeros(2), 0.3, 2.0)
     fill(memory, room.walls[0], -0.9, 0.9)
-    (segment,) = wall_segments(memory)
+    (segment,) = room_report(memory)[0]
     seen = wall_object(segment.item())
     (x1, y1, x2, y2), t = wall_ends(memory)[0], np.array([math.cos(seen.theta), math.sin(seen.theta)])
     assert (seen.x, seen.y) == pytest.approx((0.5 * (x1 + x2), 0.5 * (y1 + y2)))

@@ -12,8 +12,8 @@ from perception.bayes.memory.wall_records import WallMap
 from perception.bayes.reports.object_report import corner_object
 from perception.bayes.walls.bins import bin_of, enter_pass
 from perception.bayes.walls.corners import add_information, find_corners
-from perception.bayes.walls.report import room_report, wall_ends
-from tests.perception.bayes.rooms import fill, new_room, place_wall
+from perception.bayes.walls.report import room_report
+from tests.perception.bayes.rooms import fill, new_room, place_wall, wall_ends
 
 
 def two_walls(first: tuple[float, float], second: tuple[float, float]) -> tuple[Memory, WallMap]:

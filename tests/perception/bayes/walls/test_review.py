@@ -11,7 +11,7 @@ import pytest
 from perception.bayes.memory.state import Memory
 from perception.bayes.memory.wall_records import REMEMBERED_MAX, WALL_BINS, WallMap
 from perception.bayes.walls.corners import find_corners
-from perception.bayes.walls.report import room_report, wall_ends
+from perception.bayes.walls.report import room_report
 from perception.bayes.walls.review import (
     PLACE_NAT,
     RECENT_SPACING_M,
@@ -25,7 +25,7 @@ from perception.bayes.walls.review import (
 )
 from tests import naive_walls
 from tests.perception.bayes.random_tracks import P, S
-from tests.perception.bayes.rooms import fill, new_room, place_wall, reading
+from tests.perception.bayes.rooms import fill, new_room, place_wall, reading, wall_ends
 
 SLANT = 0.9
 """Angle between the axis and the wall's normal, rad: the wall answers from the beam's edge."""

@@ -10,10 +10,10 @@ from perception.bayes.memory.wall_records import WallMap
 from perception.bayes.walls.bins import bin_of, clear_wall, enter_pass
 from perception.bayes.walls.corners import find_corners
 from perception.bayes.walls.merging import drop_explained
-from perception.bayes.walls.report import room_report, wall_ends
+from perception.bayes.walls.report import room_report
 from perception.bayes.walls.standing import keep_while_standing
 from tests.perception.bayes.random_tracks import P
-from tests.perception.bayes.rooms import fill, new_room, place_wall
+from tests.perception.bayes.rooms import fill, new_room, place_wall, wall_ends
 
 CORNER = (2.0, 2.0)
 

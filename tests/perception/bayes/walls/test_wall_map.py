@@ -16,12 +16,11 @@ from perception.bayes.inference.placement import place_readings
 from perception.bayes.memory.state import ESTABLISHED, Memory
 from perception.bayes.tracks.observe import associate_circles
 from perception.bayes.walls.corners import find_corners
-from perception.bayes.walls.report import wall_ends
 from perception.bayes.walls.wall_map import may_be_of_wall, update_walls
 from perception.kernel import Floats
 from perception.localization.room.expected_ranges import Reflection
 from tests.perception.bayes.random_tracks import MOUNTS, NOISES, SENSORS, SETTINGS, P, new_memory
-from tests.perception.bayes.rooms import fill, new_room, place_wall, reading
+from tests.perception.bayes.rooms import fill, new_room, place_wall, reading, wall_ends
 
 ROOM = (
     (-2.0, -1.5, 2.0, -1.5),
