@@ -129,7 +129,6 @@ class FiringConfig(Strict):
 
     @model_validator(mode="after")
     def _one_pattern(self) -> FiringConfig:
-        """Refuse a firing pattern with neither a preset nor sets, or both."""
         if (self.preset is None) == (self.sets is None):
             raise ValueError("give either preset or sets, one of the two")
         if self.sets is not None and not self.sets:
@@ -148,7 +147,6 @@ class FiringConfig(Strict):
         return self.listen_preset is not None or self.listen is not None
 
     def _check_listeners(self, listen: tuple[tuple[int, ...], ...]) -> None:
-        """Refuse sets of listeners that do not belong to the sets that fire."""
         if any(len(set(s)) != len(s) for s in listen):
             raise ValueError("each set of listen may name each sensor once only")
         if self.sets is None:
@@ -193,7 +191,6 @@ class RingConfig(Strict):
 
     @model_validator(mode="after")
     def _whole_ring(self) -> RingConfig:
-        """Refuse a ring with no or two forms of its sensors, an empty range, or a servo beyond limits."""
         regular = self.count is not None and self.radius_m is not None
         partly = self.count is not None or self.radius_m is not None
         if (self.sensors is None) != regular or (self.sensors is not None and partly):
