@@ -35,8 +35,14 @@ ECHO_MARGIN_M: Final = 0.25
 def approach_object(scene: Scene, memory: Memory, use: ApproachObjectUse) -> Answer:
     """Return a vector to the place before the object, then the turn towards it, and whether both are done.
 
-    `scene`: pose, objects, and which have been visited. `memory`: the object chosen. `use`: which object, on what
-    side and from what distance.
+    Parameters
+    ----------
+    scene
+        Pose, objects, and which have been visited.
+    memory
+        The object chosen.
+    use
+        Which object, on what side and from what distance.
     """
     still = Response(SCHEMA, 0.0, 0.0)
     memory = _chosen(scene, memory, use)

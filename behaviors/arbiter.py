@@ -149,9 +149,18 @@ def limit_velocity(
     forward, in proportion to its speed. Forward and backward, the speed is limited to what the robot can stop from
     before the nearest echo in that direction, and before what it has seen there is too old. Turning on the spot is
     not limited: it needs no room.
-    `requested`: the velocity; its v divided by the base velocity is the request's vector along the heading.
-    `responses`, `percept`, `body`, `config`, `expected`: as for `arbitrate`.
-    Returned: `Drive` with abs(v) ≤ `speed_max_m_s` and abs(w) ≤ `turn_max_rad_s`, both finite; or `Stop`.
+
+    Parameters
+    ----------
+    requested
+        The velocity; its v divided by the base velocity is the request's vector along the heading.
+    responses, percept, body, config, expected
+        As for `arbitrate`.
+
+    Returns
+    -------
+    Decision
+        `Drive` with abs(v) ≤ `speed_max_m_s` and abs(w) ≤ `turn_max_rad_s`, both finite; or `Stop`.
     """
     error = _input_error(responses, percept, expected)
     if error is not None:

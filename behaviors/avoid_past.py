@@ -32,8 +32,15 @@ def avoid_past(percept: Percept, trail: Trail, config: AvoidPastConfig) -> tuple
 
     Marks within a square about the robot count alike: as many more lie to one side as to the other, so far the vector
     points to the other. Its length grows with the marks in the square up to the gain.
-    `percept`: only the pose is used. `trail`: as the last call returned it; empty for a new goal. `config`: the
-    schema's settings.
+
+    Parameters
+    ----------
+    percept
+        Only the pose is used.
+    trail
+        As the last call returned it; empty for a new goal.
+    config
+        The schema's settings.
     """
     x, y = percept.pose.x, percept.pose.y
     if not trail or math.dist(trail[-1], (x, y)) >= MARK_M:

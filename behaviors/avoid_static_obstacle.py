@@ -32,8 +32,15 @@ def repulsion(gap_m: float, zone: Zone, gain: float) -> float:
 
     Arkin, *Motor Schema-Based Mobile Robot Navigation*, IJRR 8(4), 1989: 0 for d > S, (S − d)/(S − R)·G for
     R < d ≤ S, and unbounded for d ≤ R.
-    `gap_m`: d, from the robot's rim to the echo, negative for an echo from inside the rim. `zone`: S is its
-    `sphere_m`, R its `margin_m`. `gain`: G.
+
+    Parameters
+    ----------
+    gap_m
+        d, from the robot's rim to the echo, negative for an echo from inside the rim.
+    zone
+        S is its `sphere_m`, R its `margin_m`.
+    gain
+        G.
     """
     sphere, margin = zone.sphere_m, zone.margin_m
     # Comparisons with NaN are false, so a NaN distance stays NaN and reaches the arbiter, which stops for it.

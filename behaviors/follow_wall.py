@@ -31,8 +31,14 @@ BEHIND_RAD: Final = math.radians(150.0)
 def follow_wall(scene: Scene, memory: Memory, use: FollowWallUse) -> Answer:
     """Return a vector along the wall; straight ahead while there is none.
 
-    `scene`: pose, echoes and body. `memory`: not used. `use`: gain, side, distance kept, and from how far a wall is
-    approached.
+    Parameters
+    ----------
+    scene
+        Pose, echoes and body.
+    memory
+        Not used.
+    use
+        Gain, side, distance kept, and from how far a wall is approached.
     """
     pose, obstacles = scene.percept.pose, scene.percept.obstacles
     sign = 1.0 if use.side == "left" else -1.0

@@ -40,8 +40,15 @@ def move_ahead(percept: Percept, leg: Leg, config: MoveAheadConfig) -> tuple[Res
 
     Distance is measured along the heading only, so that a detour around an obstacle does not shorten the leg. A
     finished leg stays finished even if the robot is pushed back: motion does not resume by itself.
-    `percept`: only the pose is used. `leg`: the leg so far; ``Leg.starting_at(pose)`` at the start of a drive.
-    `config`: gain, direction, and what happens after `distance_m`.
+
+    Parameters
+    ----------
+    percept
+        Only the pose is used.
+    leg
+        The leg so far; ``Leg.starting_at(pose)`` at the start of a drive.
+    config
+        Gain, direction, and what happens after `distance_m`.
     """
     direction = math.radians(config.move_ahead_direction_deg)
     ux, uy = math.cos(direction), math.sin(direction)

@@ -39,8 +39,15 @@ def move_to_goal(percept: Percept, goal: Goal, config: MoveToGoalConfig) -> tupl
 
     With d the distance, C the controlled zone, G the gain: magnitude G for d ≥ C, G·d/C below, and zero within the
     success radius.
-    `percept`: only the pose is used. `goal`: the goal, whose coordinates are taken in the frame of the percept's
-    pose, and whether it has been reached. `config`: the schema's settings.
+
+    Parameters
+    ----------
+    percept
+        Only the pose is used.
+    goal
+        The goal, whose coordinates are taken in the frame of the percept's pose, and whether it has been reached.
+    config
+        The schema's settings.
     """
     dx, dy = goal.x - percept.pose.x, goal.y - percept.pose.y
     distance = math.hypot(dx, dy)

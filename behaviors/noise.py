@@ -20,7 +20,12 @@ _BITS: Final = (1 << 64) - 1
 def noise(run_s: float, config: NoiseConfig) -> Response:
     """Return the vector at a time.
 
-    `run_s`: by the run's clock, s. `config`: gain, persistence and seed.
+    Parameters
+    ----------
+    run_s
+        By the run's clock, s.
+    config
+        Gain, persistence and seed.
     """
     heading = 2.0 * math.pi * _uniform(config.seed, math.floor(run_s / config.persistence_s))
     return Response(SCHEMA, config.noise_gain * math.cos(heading), config.noise_gain * math.sin(heading))

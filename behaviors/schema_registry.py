@@ -55,8 +55,12 @@ class PluggedUse(Protocol):
 def ahead_in_step(scene: Scene, memory: Memory, use: MoveAheadUse) -> Answer:
     """Return the vector along a direction, and whether the step's distance along it is behind the robot.
 
-    `scene`, `memory`: the pose now and as the step began; the memory is not used. `use`: direction, distance and
-    gain.
+    Parameters
+    ----------
+    scene, memory
+        The pose now and as the step began; the memory is not used.
+    use
+        Direction, distance and gain.
     """
     turned = scene.start.theta if use.relative_to == "robot" else 0.0
     direction = turned + math.radians(use.direction_deg)
@@ -119,7 +123,15 @@ def steering_in_step(scene: Scene, memory: Memory, use: FollowValleyUse | LeaveC
     """Return a vector of zero: `runtime.cycle.goal_drive` lets the schema turn that of the others.
 
     The response is needed all the same: the arbiter stops a robot of which a schema does not respond.
-    `scene`: not used. `memory`: handed back. `use`: the schema.
+
+    Parameters
+    ----------
+    scene
+        Not used.
+    memory
+        Handed back.
+    use
+        The schema.
     """
     del scene
     return Answer(Response(use.name, 0.0, 0.0), memory)
@@ -128,7 +140,14 @@ def steering_in_step(scene: Scene, memory: Memory, use: FollowValleyUse | LeaveC
 def avoid_past_in_step(scene: Scene, memory: Memory, use: AvoidPastUse) -> Answer:
     """Return the vector away from where the robot has been in this step.
 
-    `scene`: the pose. `memory`: `trail`: where the robot has been. `use`: the gain.
+    Parameters
+    ----------
+    scene
+        The pose.
+    memory
+        `trail`: where the robot has been.
+    use
+        The gain.
     """
     config = scene.behaviors.avoid_past.model_copy(update={"avoid_past_gain": use.gain})
     response, trail = avoid_past(scene.percept, memory.trail, config)
@@ -138,7 +157,14 @@ def avoid_past_in_step(scene: Scene, memory: Memory, use: AvoidPastUse) -> Answe
 def noise_in_step(scene: Scene, memory: Memory, use: NoiseUse) -> Answer:
     """Return a random vector.
 
-    `scene`: the time. `memory`: not used. `use`: the gain.
+    Parameters
+    ----------
+    scene
+        The time.
+    memory
+        Not used.
+    use
+        The gain.
     """
     config = scene.behaviors.noise.model_copy(update={"noise_gain": use.gain})
     return Answer(noise(scene.run_s, config), memory)
@@ -147,7 +173,14 @@ def noise_in_step(scene: Scene, memory: Memory, use: NoiseUse) -> Answer:
 def swirl_in_step(scene: Scene, memory: Memory, use: SwirlUse) -> Answer:
     """Return the vector round obstacles.
 
-    `scene`: obstacles, and where the other schemas lead. `memory`: not used. `use`: the gain.
+    Parameters
+    ----------
+    scene
+        Obstacles, and where the other schemas lead.
+    memory
+        Not used.
+    use
+        The gain.
     """
     config = scene.behaviors.swirl.model_copy(update={"swirl_gain": use.gain})
     way_rad = scene.percept.pose.theta if scene.way_rad is None else scene.way_rad
@@ -177,7 +210,10 @@ SCHEMAS: Final[Mapping[str, Schema]] = MappingProxyType(
 def schema_of(use: Use) -> Schema:
     """Return the function of a schema in a step.
 
-    `use`: the schema with its settings; one of an installed package brings its function with it.
+    Parameters
+    ----------
+    use
+        The schema with its settings; one of an installed package brings its function with it.
     """
     shipped = SCHEMAS.get(use.name)
     return _own_answer if shipped is None else shipped

@@ -30,8 +30,14 @@ GIVEN_UP_S: Final = 6.0
 def search(scene: Scene, memory: Memory, use: SearchUse) -> Answer:
     """Return a vector to the next corner of the lines, and whether the last one is behind.
 
-    `scene`: pose, echoes, and the pose at which the step began. `memory`: the next corner, and the progress towards
-    it. `use`: pattern, area, spacing and gain.
+    Parameters
+    ----------
+    scene
+        Pose, echoes, and the pose at which the step began.
+    memory
+        The next corner, and the progress towards it.
+    use
+        Pattern, area, spacing and gain.
     """
     corners = lines(use)
     while memory.index < len(corners):

@@ -27,8 +27,14 @@ Places: TypeAlias = Sequence[tuple[float, float]]
 def stay_on_path(scene: Scene, memory: Memory, use: StayOnPathUse) -> Answer:
     """Return a vector along the path, shorter near its end, and whether its end is reached.
 
-    `scene`: pose and map frame. The last corner counts as reached, and slows the robot down, as a goal does.
-    `memory`: how far the robot has come. `use`: the path, its frame, the gain and the distance to look ahead.
+    Parameters
+    ----------
+    scene
+        Pose and map frame. The last corner counts as reached, and slows the robot down, as a goal does.
+    memory
+        How far the robot has come.
+    use
+        The path, its frame, the gain and the distance to look ahead.
     """
     frame = scene.frame(use.frame)
     if frame is None:

@@ -36,8 +36,14 @@ TELEOPERATION_ENDED: Final = Teleoperate(0.0, 0.0)
 def teleoperation(percept: Percept, requested: Teleoperate, base_velocity_m_s: float) -> Response:
     """Return the operator's vector: along the heading or against it, length 1 for the base velocity.
 
-    `percept`: only the heading is used. `requested`: the operator's velocity. `base_velocity_m_s`: speed for a vector
-    of length 1, m/s.
+    Parameters
+    ----------
+    percept
+        Only the heading is used.
+    requested
+        The operator's velocity.
+    base_velocity_m_s
+        Speed for a vector of length 1, m/s.
     """
     magnitude = requested.v / base_velocity_m_s
     return Response(SCHEMA, magnitude * math.cos(percept.pose.theta), magnitude * math.sin(percept.pose.theta))
@@ -46,8 +52,15 @@ def teleoperation(percept: Percept, requested: Teleoperate, base_velocity_m_s: f
 def is_expired(requested: Teleoperate, age_s: float, config: TeleoperationConfig) -> bool:
     """Return whether a velocity requested `age_s` ago is no longer valid.
 
-    `requested`: the operator's velocity. `age_s`: its age at the time that counts, s: a cycle asks for that of the
-    next one. Negative if the clock went back. `config`: its `message_age_max_s` limits the validity.
+    Parameters
+    ----------
+    requested
+        The operator's velocity.
+    age_s
+        Its age at the time that counts, s: a cycle asks for that of the next one. Negative if the clock went
+        back.
+    config
+        Its `message_age_max_s` limits the validity.
     """
     return not 0.0 <= age_s < min(requested.valid_s, config.message_age_max_s)
 
@@ -55,8 +68,14 @@ def is_expired(requested: Teleoperate, age_s: float, config: TeleoperationConfig
 def blocked_by(percept: Percept, v: float, body_radius_m: float) -> str | None:
     """Return what is nearest on the way of an operator's velocity, and what to do; None if nothing is on that side.
 
-    `percept`: pose and obstacles of this cycle. `v`: the operator's speed, m/s: its sign says to which side.
-    `body_radius_m`: the robot's edge is this far from its pose, m.
+    Parameters
+    ----------
+    percept
+        Pose and obstacles of this cycle.
+    v
+        The operator's speed, m/s: its sign says to which side.
+    body_radius_m
+        The robot's edge is this far from its pose, m.
     """
     pose, sign, nearest = percept.pose, math.copysign(1.0, v), None
     c, s = math.cos(pose.theta), math.sin(pose.theta)

@@ -19,8 +19,14 @@ UNKNOWN_FRAME: Final = "the robot does not know its place in the map: wait until
 def turn(scene: Scene, memory: Memory, use: TurnUse) -> Answer:
     """Return the direction to turn to.
 
-    `scene`: the pose now and as the step began, and the map frame. `memory`: not used. `use`: the heading, and what
-    it counts from.
+    Parameters
+    ----------
+    scene
+        The pose now and as the step began, and the map frame.
+    memory
+        Not used.
+    use
+        The heading, and what it counts from.
     """
     still = Response(SCHEMA, 0.0, 0.0)
     frame = scene.start if use.relative_to == "robot" else scene.frame(use.relative_to)

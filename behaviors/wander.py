@@ -40,8 +40,14 @@ def uniform(seed: int, index: int) -> float:
 def wander(scene: Scene, memory: Memory, use: WanderUse) -> Answer:
     """Return a vector in the direction drawn last, or in another if its time is up or its way is blocked.
 
-    `scene`: pose, echoes and body. `memory`: the direction and when it was drawn. `use`: gain, seed, persistence and
-    the free way that is looked for.
+    Parameters
+    ----------
+    scene
+        Pose, echoes and body.
+    memory
+        The direction and when it was drawn.
+    use
+        Gain, seed, persistence and the free way that is looked for.
     """
     kept_s = scene.step_s - memory.since_s
     is_blocked = memory.is_set and kept_s >= KEPT_S and _free_m(scene, memory.x) < BLOCKED_M

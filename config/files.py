@@ -161,7 +161,10 @@ def files_read() -> frozenset[Path]:
 def parse_document(data: bytes, shown: str) -> dict[str, Any]:
     """Return the table of a TOML file given as bytes.
 
-    Raises `ConfigError`: the bytes are too many, not UTF-8 or not TOML; the message has line and column.
+    Raises
+    ------
+    ConfigError
+        The bytes are too many, not UTF-8 or not TOML; the message has line and column.
     """
     if len(data) > SIZE_MAX:
         raise ConfigError(f"{shown}: larger than {SIZE_MAX >> 10} KiB, so not a settings file")
@@ -262,7 +265,10 @@ def open_input(path: str | os.PathLike[str]) -> FileIO:
 def await_data(file: FileIO) -> None:
     """Return when the next read of a file does not block: at once unless it is a pipe or a device.
 
-    Raises `TimeoutError`: nothing came for `PIPE_WAIT_S`.
+    Raises
+    ------
+    TimeoutError
+        Nothing came for `PIPE_WAIT_S`.
     """
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode) and not select.select([file], [], [], PIPE_WAIT_S)[0]:
         raise TimeoutError(errno.ETIMEDOUT, f"is a pipe from which nothing came for {PIPE_WAIT_S:g} s; give a file")

@@ -73,7 +73,10 @@ class Layers:
     def put(self, location: Location, value: object, source: Source) -> None:
         """Set one value, creating the tables above it.
 
-        Raises `PathError`: the location leads through a single value, or past the end of a list.
+        Raises
+        ------
+        PathError
+            The location leads through a single value, or past the end of a list.
         """
         holder: Any = self.tree
         way: Location = ()

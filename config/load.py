@@ -84,7 +84,11 @@ def load_any(name_or_path: str | os.PathLike[str], overrides: Sequence[str] = ()
     """Return the run, world, model, mission or study of a file, by its top-level keys; a robot's as a run with it.
 
     A name is that of a shipped or installed run or, where there is none, of a robot, mission, world or model.
-    Raises `ConfigError`: the file cannot be read or is invalid.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read or is invalid.
     """
     by_name: tuple[Kind, ...] = ("runs", "robots", "missions", "worlds", "models")
     named = next((kind for kind in by_name if name_or_path in list_shipped(kind)), None)
@@ -158,7 +162,11 @@ def override_settings(settings: Settings, name: str, overrides: Sequence[str]) -
     """Return complete settings with single values overridden.
 
     Each override is ``dotted.path=value``; `name` is that of the settings' source in error messages.
-    Raises `ConfigError`: with a line for each problem.
+
+    Raises
+    ------
+    ConfigError
+        With a line for each problem.
     """
     source = Source(name)
     layers = Layers(source)
@@ -176,8 +184,10 @@ def override_settings(settings: Settings, name: str, overrides: Sequence[str]) -
 def with_known_room(settings: Settings, name_or_path: str | os.PathLike[str]) -> Settings:
     """Return the settings with the surfaces of a world as the known room, and with its places if it has any.
 
-    Raises `ConfigError`: the world cannot be read, is invalid, or has no surface; or drift is to be corrected
-    otherwise.
+    Raises
+    ------
+    ConfigError
+        The world cannot be read, is invalid, or has no surface; or drift is to be corrected otherwise.
     """
     room, name = load_world(name_or_path), f"map {os.fspath(name_or_path)}"
     places = room.places() if room.has_any else settings.places
@@ -188,7 +198,11 @@ def with_room(settings: Settings, room: WorldConfig | None, name: str) -> Settin
     """Return the settings with the surfaces of a world as the known room, or without a known room.
 
     A room of None is no known room; `name` is that of the map in error messages.
-    Raises `ConfigError`: the world has no surface; or drift is to be corrected otherwise.
+
+    Raises
+    ------
+    ConfigError
+        The world has no surface; or drift is to be corrected otherwise.
     """
     surfaces = None if room is None else room.model_dump(mode="json", include={"drum", "wall", "box", "polygon"})
     return with_value(settings, name, ("perception", "localization", "known_room"), surfaces)
@@ -197,7 +211,10 @@ def with_room(settings: Settings, room: WorldConfig | None, name: str) -> Settin
 def with_goal(settings: Settings, goal: GoalConfig) -> Settings:
     """Return the settings with a goal in place of their own goal or mission.
 
-    Raises `ConfigError`: a value is out of its bounds.
+    Raises
+    ------
+    ConfigError
+        A value is out of its bounds.
     """
     free = settings.model_copy(update={"goal": None, "mission": None})
     return with_value(free, "goal", ("goal",), goal.model_dump(mode="json"))
@@ -206,8 +223,10 @@ def with_goal(settings: Settings, goal: GoalConfig) -> Settings:
 def with_mission(settings: Settings, mission: MissionConfig) -> Settings:
     """Return the settings with a mission in place of their own goal or mission.
 
-    Raises `ConfigError`: it looks for an object that these settings do not recognise, or drives to a place that they
-    do not name.
+    Raises
+    ------
+    ConfigError
+        It looks for an object that these settings do not recognise, or drives to a place that they do not name.
     """
     free = settings.model_copy(update={"goal": None, "mission": None})
     check_places(mission, settings.places)
@@ -218,7 +237,11 @@ def with_value(settings: Settings, name: str, location: Location, value: object)
     """Return complete settings with one value replaced.
 
     The value is as a file would hold it, None where it is not given; `name` is that of its source in error messages.
-    Raises `ConfigError`: with a line for each problem.
+
+    Raises
+    ------
+    ConfigError
+        With a line for each problem.
     """
     source = Source(name)
     layers = Layers(source)
@@ -233,7 +256,10 @@ def with_value(settings: Settings, name: str, location: Location, value: object)
 def parse_text(model: type[M], text: str, name: str) -> M:
     """Return the object model, mission or world of a TOML text, called `name` in error messages.
 
-    Raises `ConfigError`: the text is not TOML, or not of this kind.
+    Raises
+    ------
+    ConfigError
+        The text is not TOML, or not of this kind.
     """
     source = Source(name)
     layers = Layers(source)

@@ -29,7 +29,10 @@ class Override:
 def parse_override(text: str) -> Override:
     """Return the override of a text `dotted.path=value`; the value is TOML, or a string without quotes.
 
-    Raises `ConfigError`: the text does not have this form.
+    Raises
+    ------
+    ConfigError
+        The text does not have this form.
     """
     shown = one_line(text) if len(text) <= 60 else one_line(text[:59]) + "…"
     if not is_utf8(text):

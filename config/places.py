@@ -125,7 +125,10 @@ PLACE_KEYS: Final = tuple(PlacesConfig.model_fields)
 def check_places(mission: MissionConfig | None, places: PlacesConfig) -> None:
     """Refuse a mission that names a place which there is not.
 
-    Raises `ConfigError`: it names one; the message lists those that there are.
+    Raises
+    ------
+    ConfigError
+        It names one; the message lists those that there are.
     """
     if mission is not None:
         problems = [no_such_place(name, places) for name in sorted(mission.places()) if places.named(name) is None]

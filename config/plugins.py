@@ -62,7 +62,10 @@ def _installed(_places: tuple[tuple[str, int, int], ...]) -> dict[str, dict[str,
 def load_plugin(entry: EntryPoint) -> object:
     """Return what an entry point names.
 
-    Raises `PluginError`: it cannot be imported, or fails as it is; the text has the error of the package's own code.
+    Raises
+    ------
+    PluginError
+        It cannot be imported, or fails as it is; the text has the error of the package's own code.
     """
     found, why = None, None
     try:
@@ -109,7 +112,10 @@ def plugged_table(name: str) -> type[BaseModel] | None:
 def plugged_use(name: str) -> type[BaseModel] | None:
     """Return an installed schema of this name with its settings, None if there is none.
 
-    Raises `PluginError`: it is no schema.
+    Raises
+    ------
+    PluginError
+        It is no schema.
     """
     entry = plugged(SCHEMAS).get(name)
     if entry is None:
@@ -127,7 +133,11 @@ def validated(model: type[M], value: object) -> M:
     """Return a package's own table as its model, whose fields may have any type that TOML can write.
 
     A strict model takes a list for a tuple, and a text for a path or an enumeration, only from JSON.
-    Raises `pydantic.ValidationError`: the table is wrong.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        The table is wrong.
     """
     return model.model_validate_json(to_json(value)) if isinstance(value, dict) else model.model_validate(value)
 
@@ -159,7 +169,11 @@ def with_own_tables(model: type[M], data: object, validate: Callable[[object], M
     """Return a robot file whose further tables are validated by the installed drivers of these names.
 
     `model` is the robot file's; `validate` validates its own fields.
-    Raises `pydantic.ValidationError`: a field or a table is wrong, or no driver has a table of this name.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        A field or a table is wrong, or no driver has a table of this name.
     """
     own = {key: data[key] for key in data if key not in model.model_fields} if isinstance(data, dict) else {}
     lacking = _lacking(model, data)

@@ -19,7 +19,11 @@ def route_config(waypoints: tuple[Waypoint, ...], frame: Frame, name: str) -> Mi
     """Return the mission of driving to places in turn.
 
     All of them, one at least, are in the same frame; `name` is that of the mission.
-    Raises `ValidationError`: the name or a waypoint is none that a mission can have.
+
+    Raises
+    ------
+    ValidationError
+        The name or a waypoint is none that a mission can have.
     """
     steps = tuple(
         StepConfig(

@@ -40,8 +40,11 @@ def with_value(text: str, place: Sequence[str | int], value: TomlValue) -> str:
     """Return a TOML text that says the same, but for one value.
 
     `place` leads to the value by keys and indices, and need not be there yet. A value of None is removed.
-    Raises `TomlEditError`: the text is not TOML, the place is within none of its tables, or what tomlkit makes of it
-    says something else.
+
+    Raises
+    ------
+    TomlEditError
+        The text is not TOML, the place is within none of its tables, or what tomlkit makes of it says something else.
     """
     import tomlkit  # here, as a start should not wait for it
 

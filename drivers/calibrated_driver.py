@@ -35,7 +35,10 @@ class CalibratedDriver:
     def drive(self, twist: Twist) -> None:
         """Request a true velocity: the base, which measures wrongly, is asked for what it takes for that.
 
-        Raises `ValueError`: the velocity is not finite.
+        Raises
+        ------
+        ValueError
+            The velocity is not finite.
         """
         self._driver.drive(Twist(twist.v * self._calibration.distance_scale, twist.w * self._calibration.turn_scale))
 

@@ -35,7 +35,10 @@ CAPABILITIES: Final[Mapping[str, str]] = MappingProxyType(
 def missing(has: Iterable[str]) -> dict[str, str]:
     """Return what a robot lacks that has what its family lists in `HAS`, with what follows.
 
-    Raises `ValueError`: one of them is no capability.
+    Raises
+    ------
+    ValueError
+        One of them is no capability.
     """
     named = set(has)
     if unknown := sorted(named - CAPABILITIES.keys()):

@@ -130,7 +130,10 @@ class RobotDriver(Protocol):
     def drive(self, twist: Twist) -> None:
         """Request a velocity; it replaces one that has not been sent yet, and is dropped unless the state is READY.
 
-        Raises `ValueError`: the velocity is not finite.
+        Raises
+        ------
+        ValueError
+            The velocity is not finite.
         """
 
     def halt(self) -> None:
@@ -146,8 +149,10 @@ class RobotDriver(Protocol):
     def set_firing(self, ring: RingConfig) -> None:
         """Change the firing pattern to that of `ring`; does nothing if it is the current one.
 
-        Raises `drivers.firing_pattern.FiringError`: the robot or its protocol cannot carry out the pattern; the
-        current one stays.
+        Raises
+        ------
+        drivers.firing_pattern.FiringError
+            The robot or its protocol cannot carry out the pattern; the current one stays.
         """
 
     def end_session(self) -> None:

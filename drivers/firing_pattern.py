@@ -114,7 +114,10 @@ def scan_order(sensor: SensorConfig) -> tuple[int, ...]:
 def _scan_masks(ring: RingConfig, masks: tuple[int, ...]) -> tuple[int, ...]:
     """Return the masks of a ring with servos, whose bits are bearings, until all servos are where they began.
 
-    Raises `FiringError`: they meet again only after too many firings.
+    Raises
+    ------
+    FiringError
+        They meet again only after too many firings.
     """
     listed = ring.sensors or ()
     orders = [scan_order(sensor) for sensor in listed]
@@ -140,7 +143,10 @@ def _scan_masks(ring: RingConfig, masks: tuple[int, ...]) -> tuple[int, ...]:
 def _listeners(ring: RingConfig, masks: tuple[int, ...]) -> tuple[int, ...]:
     """Return the masks of those that listen, one a step; none if no sensor ever listens.
 
-    Raises `FiringError`: a sensor fires in that step, or could hear two; or there is no set for each step.
+    Raises
+    ------
+    FiringError
+        A sensor fires in that step, or could hear two; or there is no set for each step.
     """
     firing, count = ring.firing, len(ring.mounts)
     if not firing.has_listeners:
@@ -199,7 +205,10 @@ def cross_pairs(axes: tuple[float, ...], fired: int, listeners: int) -> tuple[tu
 def pattern_pairs(ring: RingConfig) -> tuple[tuple[int, int], ...]:
     """Return the cross paths that the ring's pattern measures, (transmitter, listener), sorted.
 
-    Raises `FiringError`: as by `firing_pattern`.
+    Raises
+    ------
+    FiringError
+        As by `firing_pattern`.
     """
     pattern, axes = firing_pattern(ring), tuple(mount.angle_rad for mount in ring.mounts)
     steps = zip(pattern.masks, pattern.listeners, strict=True) if pattern.listeners else ()
@@ -214,7 +223,10 @@ def _mask(numbers: Iterable[int]) -> int:
 def _preset_masks(preset: Preset, count: int) -> tuple[int, ...]:
     """Return the masks of a preset's steps.
 
-    Raises `FiringError`: the sensors cannot be divided so.
+    Raises
+    ------
+    FiringError
+        The sensors cannot be divided so.
     """
     sizes = _AT_A_TIME[preset]
     if any(count % together for together in sizes):
@@ -232,7 +244,10 @@ def _preset_masks(preset: Preset, count: int) -> tuple[int, ...]:
 def _rotated_masks(field: str, sets: tuple[tuple[int, ...], ...], rotations: int, count: int) -> tuple[int, ...]:
     """Return the masks of sets that are fired in turn, and then so many times again, each a sensor further.
 
-    Raises `FiringError`: the ring has no such sensor.
+    Raises
+    ------
+    FiringError
+        The ring has no such sensor.
     """
     missing = sorted({i for numbers in sets for i in numbers if i >= count})
     if missing:
@@ -246,7 +261,10 @@ def _rotated_masks(field: str, sets: tuple[tuple[int, ...], ...], rotations: int
 def _check_step(step_period_s: float, window_m: float) -> None:
     """Check that echoes of a firing arrive before the next one.
 
-    Raises `FiringError`: they may not.
+    Raises
+    ------
+    FiringError
+        They may not.
     """
     needed_s = time_of_flight_s(window_m)
     if step_period_s >= needed_s - _TOLERANCE_S:

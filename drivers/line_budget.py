@@ -25,7 +25,11 @@ def refuse_slow_line(link: LinkConfig, fixed_bytes_s: float, firing_bytes: float
     """Raise an error if the line is too slow for what the robot sends.
 
     Besides its ranges it sends `fixed_bytes_s`, for each firing `firing_bytes`, every `step_s`.
-    Raises `FiringError`: it is too slow: the message names the speeds and the firing periods that fit.
+
+    Raises
+    ------
+    FiringError
+        It is too slow: the message names the speeds and the firing periods that fit.
     """
     if "://" in (link.port or ""):  # a network carries more than any line
         return

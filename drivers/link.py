@@ -150,7 +150,10 @@ class Link:
     async def open_once(self) -> None:
         """Open the line, unless it is already open.
 
-        Raises `LinkError`: the line cannot be opened; the message says why.
+        Raises
+        ------
+        LinkError
+            The line cannot be opened; the message says why.
         """
         if self._line is not None:
             return

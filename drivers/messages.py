@@ -49,7 +49,10 @@ def _as_list(value: object) -> object:
 def _check_ranges(ranges_m: NDArray[Any]) -> None:
     """Check ranges of a recording, m.
 
-    Raises `ValueError`: one is below 0, or too long to be one.
+    Raises
+    ------
+    ValueError
+        One is below 0, or too long to be one.
     """
     heard = ranges_m[~np.isnan(ranges_m) & (ranges_m != math.inf)]
     if len(heard) and not (heard.min() >= 0.0 and heard.max() <= RANGE_MAX_M):

@@ -21,7 +21,11 @@ class OdometryGaps:
 
     A restart or a loose cable makes one gap, and samples follow each other after it. Times are those of the looks, so
     that a gap is one in which a look found nothing for too long.
-    `longest_s`: longest gap after which the line is not down, s.
+
+    Parameters
+    ----------
+    longest_s : float
+        Longest gap after which the line is not down, s.
     """
 
     def __init__(self, longest_s: float) -> None:

@@ -53,8 +53,10 @@ class DriverFamily(Protocol):
     def make_driver(self, config: RobotConfig) -> RobotDriver:
         """Return a driver for the robot that `config` describes.
 
-        Raises `drivers.firing_pattern.FiringError`: the robot or its protocol cannot carry out the firing pattern of
-        `config`.
+        Raises
+        ------
+        drivers.firing_pattern.FiringError
+            The robot or its protocol cannot carry out the firing pattern of `config`.
         """
 
     def make_device(
@@ -84,7 +86,10 @@ def driver_names() -> tuple[str, ...]:
 def capabilities(config: RobotConfig) -> frozenset[str]:
     """Return what the robots of a driver can do; a family that lists nothing in `HAS` can do all.
 
-    Raises `DriverError`: there is no driver named `config.robot.driver`, or it cannot be loaded.
+    Raises
+    ------
+    DriverError
+        There is no driver named `config.robot.driver`, or it cannot be loaded.
     """
     return frozenset(getattr(_family(config.robot.driver), "HAS", CAPABILITIES))
 
@@ -94,7 +99,11 @@ def deadman_s(config: RobotConfig) -> float | None:
 
     A family whose robot file says so has a function `deadman_s` of the file. The others' robots report their own, and
     `link.deadman_max_s` is the longest with which a run begins.
-    Raises `DriverError`: there is no driver named `config.robot.driver`, or it cannot be loaded.
+
+    Raises
+    ------
+    DriverError
+        There is no driver named `config.robot.driver`, or it cannot be loaded.
     """
     if "deadman" not in capabilities(config):
         return None
@@ -165,7 +174,11 @@ def line_options(config: RobotConfig) -> LineOptions:
     """Return how the robot's line is opened, as arguments of `drivers.link.Link`; none for a port or a connection.
 
     A family that opens its line itself has a function `line_options` of the robot file.
-    Raises `DriverError`: there is no driver named `config.robot.driver`, or it cannot be loaded.
+
+    Raises
+    ------
+    DriverError
+        There is no driver named `config.robot.driver`, or it cannot be loaded.
     """
     options: Callable[[RobotConfig], LineOptions] | None
     options = getattr(_family(config.robot.driver), "line_options", None)
@@ -198,7 +211,10 @@ def _names_frames(family: DriverFamily) -> bool:
 def _family(name: str) -> DriverFamily:
     """Return the family of a driver's name, imported.
 
-    Raises `DriverError`: there is none, or it cannot be imported.
+    Raises
+    ------
+    DriverError
+        There is none, or it cannot be imported.
     """
     entry = SHIPPED.get(name) or known_drivers().get(name)
     if entry is None:

@@ -57,7 +57,10 @@ def encode(frames: Iterable[Frame]) -> bytes:
 def decode(message: bytes) -> list[Frame]:
     """Return the frames of a serialized message.
 
-    Raises `ValueError`: it is not such a message.
+    Raises
+    ------
+    ValueError
+        It is not such a message.
     """
     try:
         return list(_decode(message))
@@ -156,7 +159,10 @@ class _Callbacks(ctypes.Structure):
 def _renamed() -> Any:  # noqa: ANN401 - a class of ROS
     """Return a type with the name of `TFMessage` and the functions of `TransformStamped`, which bytes do not need.
 
-    Raises `ImportError`: ROS has no support for it here.
+    Raises
+    ------
+    ImportError
+        ROS has no support for it here.
     """
     from geometry_msgs.msg import TransformStamped
 

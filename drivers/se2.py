@@ -17,7 +17,12 @@ numbers."""
 def exp(x: float, y: float, theta: float) -> Pose:
     """Return the pose that a constant twist reaches from the origin in unit time.
 
-    `x`, `y`: velocity, m per unit time. `theta`: turning rate, rad per unit time.
+    Parameters
+    ----------
+    x, y
+        Velocity, m per unit time.
+    theta
+        Turning rate, rad per unit time.
 
     Notes
     -----
@@ -36,7 +41,11 @@ def log(pose: Pose) -> tuple[float, float, float]:
     """Return the constant twist (x, y, theta) that reaches `pose` from the origin in unit time.
 
     `pose.theta` is not wrapped. The inverse of V is [[c, h], [−h, c]] with h = θ/2, c = h/tan h.
-    Raises `ValueError`: `pose.theta` is a full turn or more: infinitely many twists, or none, lead there.
+
+    Raises
+    ------
+    ValueError
+        `pose.theta` is a full turn or more: infinitely many twists, or none, lead there.
     """
     if abs(pose.theta) >= 2.0 * math.pi:
         raise ValueError(f"a turn of {pose.theta:g} rad has no single twist: it must be less than a full turn")

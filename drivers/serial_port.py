@@ -109,7 +109,11 @@ async def open_off_loop(config: LinkConfig, opener: OpenPort, timeout_s: float) 
 
     The thread is a daemon, so that a port that never opens blocks neither the loop nor the end of the process. A port
     that opens after the timeout is closed again.
-    Raises `LinkError`: the port cannot be opened, or not within `timeout_s`.
+
+    Raises
+    ------
+    LinkError
+        The port cannot be opened, or not within `timeout_s`.
     """
     if config.port is None:
         raise LinkError("no serial port is named; give it as --port or link.port")

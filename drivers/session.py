@@ -100,7 +100,11 @@ class Session(ABC, Generic[S]):
         """Request a velocity, in place of one that has not been sent; it is clamped to the limits when it is sent.
 
         It is dropped unless the robot may be driven then.
-        Raises `ValueError`: the velocity is not finite.
+
+        Raises
+        ------
+        ValueError
+            The velocity is not finite.
         """
         if not (math.isfinite(twist.v) and math.isfinite(twist.w)):
             raise ValueError(f"cannot drive at {twist}: a velocity must be finite; something divided by zero")

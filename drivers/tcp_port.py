@@ -108,7 +108,10 @@ class TcpPort:
 def _address(url: str) -> tuple[str, int]:
     """Return host and port of a URL.
 
-    Raises `ValueError`: it is not of the form socket://host:port.
+    Raises
+    ------
+    ValueError
+        It is not of the form socket://host:port.
     """
     parts = urlsplit(url)
     if not parts.hostname or not parts.port or parts.path.strip("/") or parts.query or parts.username:

@@ -80,8 +80,12 @@ def up_to(most: int) -> Bound:
 def bounds(inner: Mapping[str, Declared] | None = None, /, **attributes: Declared) -> Mapping[str, Declared]:
     """Return what a class declares in `BOUNDS`.
 
-    `inner`: by dotted name: fields of the object's parts whose bounds only this object knows, as the models are its
-    own. `attributes`: by the name of the object's own attribute. Flags of dtype bool need no declaration.
+    Parameters
+    ----------
+    inner : mapping
+        By dotted name: fields of the object's parts whose bounds only this object knows, as the models are its own.
+    **attributes
+        By the name of the object's own attribute. Flags of dtype bool need no declaration.
     """
     return MappingProxyType({**attributes, **(inner or {})})
 
@@ -96,7 +100,10 @@ def relaxed(bound: Bound | Fields) -> Bound | Fields:
 def check_values(name: str, values: NDArray[Any], bound: Bound) -> None:
     """Check all values of one number.
 
-    Raises `ValueError`: a value is out of its bound.
+    Raises
+    ------
+    ValueError
+        A value is out of its bound.
     """
     if values.dtype.kind == "b":
         values = values.view(np.uint8)  # any other byte than 0 and 1 misleads numpy

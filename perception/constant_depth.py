@@ -29,7 +29,12 @@ _UNDECIDED: Final = (0.25, 0.25, 0.25, 0.25)
 def constant_depths(ring: RingConfig, firings: Sequence[Firing]) -> list[tuple[EchoKind, int]]:
     """Return the surfaces, each with the number of its bearings.
 
-    `ring`: with sensors on servos; its other sensors are not used. `firings`: of one stand.
+    Parameters
+    ----------
+    ring : RingConfig
+        With sensors on servos; its other sensors are not used.
+    firings : sequence of Firing
+        Of one stand.
     """
     heard = np.array([firing.ranges_m for firing in firings])
     found, begin = list[tuple[EchoKind, int]](), 0

@@ -60,7 +60,10 @@ class DetectedObject:
 def worst_sigma(xx: float, xy: float, yy: float) -> float:
     """Return the standard deviation along a covariance's longest axis, m: the root of the greatest eigenvalue.
 
-    `xx`, `xy`, `yy`: the covariance, m².
+    Parameters
+    ----------
+    xx, xy, yy : float
+        The covariance, m².
     """
     middle = 0.5 * (xx + yy)
     return math.sqrt(max(0.0, middle + math.hypot(0.5 * (xx - yy), xy)))

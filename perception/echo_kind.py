@@ -142,8 +142,17 @@ def _path_function(kind: Kind, radius_m: float, t: np.ndarray, listener: np.ndar
 def half_paths_over_circle(t: np.ndarray, listener: np.ndarray, centre: complex, radius_m: float) -> Floats:
     """Return half the shortest way over a circle between pairs of points outside it (Alhazen's problem).
 
-    `t`, `listener`: the points as complex numbers, shape (n,), m. `centre`, `radius_m`: the circle, m.
-    Returned, shape (n,): where the circle parts the points, the way over the point that is least wrong.
+    Parameters
+    ----------
+    t, listener
+        The points as complex numbers, shape (n,), m.
+    centre, radius_m
+        The circle, m.
+
+    Returns
+    -------
+    (n,) float
+        Where the circle parts the points, the way over the point that is least wrong.
     """
     a, b = t - centre, listener - centre
     from_t, from_l = np.maximum(abs(a), radius_m), np.maximum(abs(b), radius_m)

@@ -263,8 +263,12 @@ class Evidence:
 def invalid_pose(x: float, y: float, theta: float) -> str | None:
     """Return why a pose entered by the operator (m, rad) is invalid, None if it is valid.
 
-    `x`, `y`: position in the edit's frame, m; may be NaN or infinite, which is invalid. `theta`: heading, rad; it
-    need not be wrapped.
+    Parameters
+    ----------
+    x, y : float
+        Position in the edit's frame, m; may be NaN or infinite, which is invalid.
+    theta : float
+        Heading, rad; it need not be wrapped.
     """
     if abs(x) <= EDIT_COORDINATE_MAX_M and abs(y) <= EDIT_COORDINATE_MAX_M and abs(theta) <= EDIT_COORDINATE_MAX_M:
         return None

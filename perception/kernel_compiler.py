@@ -232,8 +232,13 @@ def _digests() -> KernelDigests:
 class _KernelCache:
     """The files of a kernel, one for each type of its arguments, named by the digest of what it is made of.
 
-    `allocates`: whether it allocates. Then numba first loads everything that compiling needs, its allocator among it,
-    which takes a fifth of a second.
+    Parameters
+    ----------
+    kernel : KernelDispatcher
+        The kernel.
+    allocates : bool
+        Whether it allocates. Then numba first loads everything that compiling needs, its allocator among it, which
+        takes a fifth of a second.
     """
 
     def __init__(self, kernel: KernelDispatcher, *, allocates: bool) -> None:

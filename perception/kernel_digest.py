@@ -30,7 +30,10 @@ FOREIGN: Final = ("builtins", "math", "numba", "numpy")
 def tools_digest(compiler: Mapping[str, object]) -> str:
     """Return a digest of what compiles: versions, checks of bounds, and the functions of our compiler's module.
 
-    `compiler`: the names of the module `perception.kernel_compiler`.
+    Parameters
+    ----------
+    compiler : mapping
+        The names of the module `perception.kernel_compiler`.
     """
     digest = hashlib.sha256()
     versions = (PYVERSION, numba.__version__, llvmlite.__version__, np.__version__)
@@ -58,7 +61,10 @@ def _functions(value: object, module: str) -> Iterator[FunctionType]:
 class KernelDigests:
     """The digests of kernels; each is computed once.
 
-    `tools`: from `tools_digest`.
+    Parameters
+    ----------
+    tools : str
+        From `tools_digest`.
     """
 
     def __init__(self, tools: str) -> None:
@@ -71,7 +77,10 @@ class KernelDigests:
     def of(self, kernel: Any, signature: str) -> str:  # noqa: ANN401 - a dispatcher, to which numba gives no type
         """Return the digest of a kernel for arguments of these types.
 
-        Raises `TypeError`: it uses a value that no digest covers.
+        Raises
+        ------
+        TypeError
+            It uses a value that no digest covers.
         """
         digest = hashlib.sha256(f"{self._tools}\n{signature}\n".encode())
         seen: dict[FunctionType, None] = {}

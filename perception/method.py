@@ -61,8 +61,12 @@ class Method(Protocol):
         """Write where in its beam each echo of the last firing came from; return what is known of slanting walls.
 
         That is −1 if they do not answer, as mirrors, 1 if they do, and 0 if it is not known.
-        `bearings`, shape (n,): by sensor, rad from its axis, counter-clockwise; NaN where nothing that is sure
-        explains the echo. That of a sensor that heard the same as before, from the same place, stays. Updated.
+
+        Parameters
+        ----------
+        bearings : (n,) float
+            By sensor, rad from its axis, counter-clockwise; NaN where nothing that is sure explains the echo. That of
+            a sensor that heard the same as before, from the same place, stays. Updated.
         """
         ...
 
@@ -121,7 +125,14 @@ class Method(Protocol):
 def make_method(ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> Method:
     """Return the method that the settings name.
 
-    `ring`: the sensors. `models`: the objects to recognise. `config`: the method and its settings.
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    models : sequence of ModelConfig
+        The objects to recognise.
+    config : PerceptionConfig
+        The method and its settings.
     """
     if config.method == "paper":
         from perception.paper.paper_method import PaperPerception

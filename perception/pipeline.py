@@ -137,7 +137,10 @@ class Perception:
     def observe(self, firing: Firing) -> int:
         """Enter one firing and return how many outline segments it completed.
 
-        Raises `ValueError`: the firing is of another ring; compiled code would read beyond its arrays.
+        Raises
+        ------
+        ValueError
+            The firing is of another ring; compiled code would read beyond its arrays.
         """
         if len(firing.ranges_m) != self._sensors:
             raise ValueError(f"a firing of {len(firing.ranges_m)} ranges, but the ring has {self._sensors} sensors")
@@ -384,7 +387,10 @@ class Perception:
     def restore(self, snapshot: Snapshot) -> None:
         """Continue from a snapshot that perception with the same settings made.
 
-        Raises `ValueError`: the snapshot was made with other settings.
+        Raises
+        ------
+        ValueError
+            The snapshot was made with other settings.
         """
         put_back(self, snapshot)
         places = (self.map_frame, self.known_room, self.echo_lag)

@@ -22,8 +22,14 @@ __all__ = ["Recogniser"]
 class Recogniser:
     """Recognises objects in the readings of a ring of sonars, firing by firing.
 
-    `ring`: the sensors, as in ``config.load.load_robot("p3dx").ring``. `models`: the objects to recognise, as in
-    ``[config.load.load_model("drum")]``. `config`: the method and its settings.
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors, as in ``config.load.load_robot("p3dx").ring``.
+    models : sequence of ModelConfig
+        The objects to recognise, as in ``[config.load.load_model("drum")]``.
+    config : PerceptionConfig, optional
+        The method and its settings.
     """
 
     def __init__(
@@ -82,7 +88,10 @@ class Recogniser:
     def _check(self, poses: Floats, ranges_m: Floats, times_s: Floats, ring_yaws: Floats) -> None:
         """Check what a person may get wrong; compiled code reads it unchecked.
 
-        Raises `ValueError`: as `add` says.
+        Raises
+        ------
+        ValueError
+            As `add` says.
         """
         firings = len(poses)
         if poses.shape != (firings, 3):

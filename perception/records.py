@@ -179,7 +179,14 @@ class _View:
 def _view_class(name: str, fields: dict[str, Any], dtype: np.dtype[Any]) -> type:
     """Return the class of a record's stand-in, which makes arrays and inner records at their first use.
 
-    `name`: the record's. `fields`: annotations by field. `dtype`: the record's, for the places of the fields.
+    Parameters
+    ----------
+    name : str
+        The record's.
+    fields : dict of str
+        Annotations by field.
+    dtype : dtype
+        The record's, for the places of the fields.
     """
     members: dict[str, Any] = {"__slots__": ()}
     for field, hint in fields.items():

@@ -49,8 +49,14 @@ def farthest_m(mounts: Sequence[tuple[float, float, float]]) -> float:
 def turned_mounts(mounts: Floats, turning: tuple[int, ...], turn: float) -> Floats:
     """Return the mounts with those of some sensors turned about the ring's centre; the same array if there are none.
 
-    `mounts`, shape (n, 3): x, y (m), direction (rad) of each sensor. `turning`: the sensors that turn. `turn`: by how
-    much, rad: direction of travel less that of the ring.
+    Parameters
+    ----------
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor.
+    turning : tuple of int
+        The sensors that turn.
+    turn : float
+        By how much, rad: direction of travel less that of the ring.
     """
     if not turning:
         return mounts

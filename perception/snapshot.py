@@ -50,8 +50,11 @@ def numbers_of(snapshot: Snapshot) -> Iterator[tuple[str, NDArray[Any]]]:
 def put_back(owner: object, snapshot: Snapshot) -> None:
     """Overwrite an object's memory with a snapshot of another object made from the same settings.
 
-    Raises `ValueError`: the snapshot is of something else: names, shapes or fields differ. Or numbers that are each
-    in their bounds contradict each other, as a part's method `contradiction` says; the object is of no use then.
+    Raises
+    ------
+    ValueError
+        The snapshot is of something else: names, shapes or fields differ. Or numbers that are each in their bounds
+        contradict each other, as a part's method `contradiction` says; the object is of no use then.
     """
     mine = dict(_arrays(owner))
     if mine.keys() != snapshot.keys():

@@ -64,7 +64,12 @@ class StandSurface(NamedTuple):
 def stand_of(firings: Sequence[Firing], robot_s: float = math.inf) -> Sequence[Firing]:
     """Return the firings at the place where the robot was at a time by its own clock; none if there was none before.
 
-    `firings`: in order of time. `robot_s`: s; by default the end.
+    Parameters
+    ----------
+    firings : sequence of Firing
+        In order of time.
+    robot_s : float
+        s; by default the end.
     """
     last = next((i for i in reversed(range(len(firings))) if firings[i].robot_s <= robot_s), None)
     if last is None:
@@ -99,7 +104,13 @@ def surfaces_of_stand(ring: RingConfig, firings: Sequence[Firing]) -> tuple[Stan
     """Return the surfaces that were heard over at least three different paths from one place, the nearest first.
 
     Those of a ring with servos are its regions of constant depth.
-    `ring`: the sensors. `firings`: of one stand, as of `stand_of`.
+
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    firings : sequence of Firing
+        Of one stand, as of `stand_of`.
     """
     if not firings:
         return ()

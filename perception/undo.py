@@ -43,7 +43,12 @@ Undo: TypeAlias = tuple[Edit, ...]
 def edit_with_undo(edit: Edit, seen: Perception) -> tuple[str | None, Undo]:
     """Apply an operator's edit; return why it was refused, None if it was not, and what takes it back.
 
-    `edit`: the edit, which may be refused in part. `seen`: the map, updated.
+    Parameters
+    ----------
+    edit : Edit
+        The edit, which may be refused in part.
+    seen : Perception
+        The map, updated.
     """
     areas, objects = seen.vacant_areas(), _rows(seen, edit)
     walls = seen.method.kept_walls() if isinstance(edit, ClearMap) else ""

@@ -69,8 +69,12 @@ class VacantAreas:
     def mark(self, x: float, y: float, radius: float, detected: int = NO_NUMBER) -> str | None:
         """Add an area; return None, or why there is no room for it.
 
-        `x`, `y`, `radius`: m. `detected`: number of the object that was rejected: it stays hidden although its place
-        is refined.
+        Parameters
+        ----------
+        x, y, radius : float
+            m.
+        detected : int
+            Number of the object that was rejected: it stays hidden although its place is refined.
         """
         if self.count == AREAS_MAX:
             return NO_ROOM

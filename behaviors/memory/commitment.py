@@ -47,8 +47,12 @@ class Commitment:
     def kept_angle(self, angle_rad: float, run_s: float | None = None) -> float:
         """Return the angle by which to turn to a course, within (−2π, 2π): on the side to which the robot turns.
 
-        `angle_rad`: the course's angle from the heading, within [−π, π], rad. `run_s`: now, by the run's clock, s;
-        None if a turn to the other side need not wait.
+        Parameters
+        ----------
+        angle_rad
+            The course's angle from the heading, within [−π, π], rad.
+        run_s
+            Now, by the run's clock, s; None if a turn to the other side need not wait.
         """
         turned_s = math.inf if run_s is None or self.turned_run_s is None else run_s - self.turned_run_s
         if angle_rad * self.side < 0.0 <= turned_s < TURN_S:  # it drives straight on, or turns the long way
@@ -60,8 +64,14 @@ class Commitment:
     def commit(self, twist: Twist, run_s: float, requested: int = 0) -> tuple[Twist, Commitment]:
         """Return the velocity to command, without its speed if that is a start that waits; and what it commits to.
 
-        `twist`: the velocity that was decided on. `run_s`: now, by the run's clock, s. `requested`: sign of the speed
-        that an operator asks for; another one than before does not wait.
+        Parameters
+        ----------
+        twist
+            The velocity that was decided on.
+        run_s
+            Now, by the run's clock, s.
+        requested
+            Sign of the speed that an operator asks for; another one than before does not wait.
         """
         started_run_s = self.started_run_s if requested == self.requested else None
         side, turned_run_s = (twist.w > FAINT_RAD_S) - (twist.w < -FAINT_RAD_S), self.turned_run_s

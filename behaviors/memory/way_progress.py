@@ -32,7 +32,10 @@ SLOW: Final = 0.25
 def due_m(speed_m_s: float) -> float:
     """Return the way that a robot has to gain in `STALLED_S`, m.
 
-    `speed_m_s`: what it drives on a free way, m/s.
+    Parameters
+    ----------
+    speed_m_s
+        What it drives on a free way, m/s.
     """
     return min(GROUND_M, SLOW * speed_m_s * STALLED_S)
 

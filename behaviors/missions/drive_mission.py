@@ -60,8 +60,12 @@ class MissionDrive:
 def drive_mission(mission: Mission, scene: Scene) -> MissionDrive:
     """Return what the mission asks for, and the mission after this cycle.
 
-    `mission`: the mission so far. `scene`: what the robot sees; its `start`, `step_s` and `visited` are filled in
-    here.
+    Parameters
+    ----------
+    mission
+        The mission so far.
+    scene
+        What the robot sees; its `start`, `step_s` and `visited` are filled in here.
     """
     if mission.progress.status != "running":
         return MissionDrive(mission, hold_reason=mission.progress.reason)
@@ -98,8 +102,15 @@ def given_up(mission: Mission, fault: Fault, why: str) -> Mission:
 
     It goes where the condition of that fault leads, or without one is held. An unreachable goal is a stuck step
     where only that has a condition.
-    `mission`: the mission, in a step with a goal. `fault`: why the goal was given up. `why`: the same for the
-    operator.
+
+    Parameters
+    ----------
+    mission
+        The mission, in a step with a goal.
+    fault
+        Why the goal was given up.
+    why
+        The same for the operator.
     """
     faults = (fault, "stuck")
     found = [c for when in faults for c in mission.step.conditions if c.when == when]

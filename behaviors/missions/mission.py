@@ -90,8 +90,14 @@ class MissionEdit:
 def goes_to(mission: Mission, target: str, why: str) -> Mission:
     """Return the mission after a condition has led to a target.
 
-    `mission`: the mission so far. `target`: a step's name, or one of `config.mission_step.TARGETS`. `why`: what led
-    there, for the operator.
+    Parameters
+    ----------
+    mission
+        The mission so far.
+    target
+        A step's name, or one of `config.mission_step.TARGETS`.
+    why
+        What led there, for the operator.
     """
     progress, plan = mission.progress, mission.plan
     if target == HOLD:
@@ -118,7 +124,13 @@ def after_stop(mission: Mission, *, bumper: bool) -> Mission:
     """Return a mission after the robot has left DRIVE: held, at the step that its condition on a contact names.
 
     Where that condition leads to no further step, the mission ends. One that does not run is returned unchanged.
-    `mission`: the mission so far. `bumper`: whether a contact stopped the robot.
+
+    Parameters
+    ----------
+    mission
+        The mission so far.
+    bumper
+        Whether a contact stopped the robot.
     """
     if mission.progress.status != "running":
         return mission
@@ -183,8 +195,12 @@ def continued(before: Mission, after: Mission) -> Mission:
 def route(waypoints: tuple[Waypoint, ...], frame: Frame) -> Mission:
     """Return the mission of driving to places in turn.
 
-    `waypoints`: each place x, y, m, and the final heading there in degrees, None for any. `frame`: the frame of all
-    of them.
+    Parameters
+    ----------
+    waypoints
+        Each place x, y, m, and the final heading there in degrees, None for any.
+    frame
+        The frame of all of them.
     """
     return Mission(route_config(waypoints, frame, ROUTE))
 

@@ -103,8 +103,14 @@ class Block:
 def pocket_ahead(echoes: Floats, pose: Pose, way_rad: float, reach_m: float) -> Pocket | None:
     """Return the pocket that a way leads into, None if there is none.
 
-    `echoes`: fresh ones, shape (n, 2), m. `pose`, `way_rad`: the robot's place, and the direction of its way.
-    `reach_m`: how far an echo counts.
+    Parameters
+    ----------
+    echoes
+        Fresh ones, shape (n, 2), m.
+    pose, way_rad
+        The robot's place, and the direction of its way.
+    reach_m
+        How far an echo counts.
     """
     dx, dy = echoes[:, 0] - pose.x, echoes[:, 1] - pose.y
     c, s = math.cos(way_rad), math.sin(way_rad)

@@ -71,8 +71,12 @@ def seen_speed_m_s(percept: Percept, body: BodyConfig, clearance_m: float, turn_
 def oldest_look_s(view: FieldOfView, direction_rad: float, half_angle_rad: float) -> float:
     """Return the age of the direction that was looked in longest ago, s; infinite where no look is fresh.
 
-    `view`: where the ring has looked. `direction_rad`, `half_angle_rad`: the directions from one to the other side of
-    this one, in the odometry's frame.
+    Parameters
+    ----------
+    view
+        Where the ring has looked.
+    direction_rad, half_angle_rad
+        The directions from one to the other side of this one, in the odometry's frame.
     """
     sectors = _sectors(view.bearings_rad, view.ages_s, view.half_angle_rad, direction_rad, half_angle_rad)
     return max(age_s for _, _, age_s in sectors)
@@ -112,8 +116,15 @@ def unseen_way(percept: Percept, direction_rad: float, body: BodyConfig, clearan
 
     The sensors count that look there now. After a turn a direction may be unseen although none lacks: then the next
     firings look there.
-    `percept`: pose and field of view of this cycle. `direction_rad`: the direction, in the odometry's frame. `body`,
-    `clearance_m`: as for `seen_speed_m_s`.
+
+    Parameters
+    ----------
+    percept
+        Pose and field of view of this cycle.
+    direction_rad
+        The direction, in the odometry's frame.
+    body, clearance_m
+        As for `seen_speed_m_s`.
     """
     view, half_angle = percept.field_of_view, path_half_angle_rad(body, clearance_m)
     sectors = _sectors(view.axes_rad, view.sensor_ages_s, view.half_angle_rad, direction_rad, half_angle)
@@ -135,8 +146,15 @@ def angle_to_look(percept: Percept, course_rad: float, presumed_rad: Floats | No
 
     On a course the robot comes nearer to walls that face it from anywhere within 90°, and a mirror answers only beams
     that meet it at a right angle.
-    `percept`: pose and field of view of this cycle. `course_rad`: the direction of the way, in the odometry's frame.
-    `presumed_rad`: as of `presumed_ahead_rad`: the robot looks there as well.
+
+    Parameters
+    ----------
+    percept
+        Pose and field of view of this cycle.
+    course_rad
+        The direction of the way, in the odometry's frame.
+    presumed_rad
+        As of `presumed_ahead_rad`: the robot looks there as well.
     """
     unknown = percept.field_of_view.unknown_rad
     if presumed_rad is not None and len(presumed_rad):
@@ -153,8 +171,13 @@ def presumed_ahead_rad(percept: Percept, body: BodyConfig, clearance_m: float) -
     """Return the directions of presumed walls that stop the robot where it stands, in the odometry's frame, rad.
 
     A wall that was heard from elsewhere and need not go on is looked at before it keeps a robot standing.
-    `percept`: pose and field of view of this cycle. `body`, `clearance_m`: as for
-    `behaviors.surroundings.clearance.stoppable_speed_m_s`.
+
+    Parameters
+    ----------
+    percept
+        Pose and field of view of this cycle.
+    body, clearance_m
+        As for `behaviors.surroundings.clearance.stoppable_speed_m_s`.
     """
     feet, pose = percept.field_of_view.presumed, percept.pose
     if not len(feet):
@@ -186,8 +209,15 @@ def _sectors(
     Begin and end count from `direction_rad`. The youngest beam is laid out first, and each older one where no younger
     one lies; where none lies, the age is infinite. Plain Python: a standing ring has a handful of beams ahead, for
     which numpy's calls cost several times as much.
-    `bearings_rad`, `ages_s`: axes and ages of the beams, shape (n,). `beam_rad`: half their width. `direction_rad`,
-    `half_angle_rad`: as for `oldest_look_s`.
+
+    Parameters
+    ----------
+    bearings_rad, ages_s
+        Axes and ages of the beams, shape (n,).
+    beam_rad
+        Half their width.
+    direction_rad, half_angle_rad
+        As for `oldest_look_s`.
     """
     reach = half_angle_rad + beam_rad
     beams = [

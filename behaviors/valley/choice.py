@@ -22,7 +22,10 @@ def apart(a: float, b: float) -> float:
 def valleys(blocked: bytes) -> list[tuple[int, int]]:
     """Return the runs of free sectors: the first one, and their number.
 
-    `blocked`: a byte for each sector, 0 where it is free.
+    Parameters
+    ----------
+    blocked : bytes
+        A byte for each sector, 0 where it is free.
     """
     begin = blocked.find(1)
     if begin < 0:
@@ -39,8 +42,14 @@ def valleys(blocked: bytes) -> list[tuple[int, int]]:
 def candidates(blocked: bytes, target: float, wide: float) -> list[float]:
     """Return the directions to choose from: of a narrow valley its middle, of a wide one its sides and the target.
 
-    `blocked`: a byte for each sector, 0 where it is free. `target`: the direction of the target, in sectors. `wide`:
-    a valley of so many sectors is wide; its sides are driven at half of that from the border.
+    Parameters
+    ----------
+    blocked : bytes
+        A byte for each sector, 0 where it is free.
+    target : float
+        The direction of the target, in sectors.
+    wide : float
+        A valley of so many sectors is wide; its sides are driven at half of that from the border.
     """
     found: list[float] = []
     for first, count in valleys(blocked):
@@ -58,8 +67,12 @@ def candidates(blocked: bytes, target: float, wide: float) -> list[float]:
 def gaps(closed: bytes, blocked: bytes) -> list[float]:
     """Return the middles of the valleys that the robot just passes, and nowhere with the room that it wants.
 
-    `closed`: a byte for each sector, 0 where the robot just passes. `blocked`: the same, 0 where it passes with the
-    room that it wants.
+    Parameters
+    ----------
+    closed : bytes
+        A byte for each sector, 0 where the robot just passes.
+    blocked : bytes
+        The same, 0 where it passes with the room that it wants.
     """
     just = [(first, count) for first, count in valleys(closed) if count < SECTORS]
     return [

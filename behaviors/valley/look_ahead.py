@@ -106,7 +106,14 @@ class Search:
 def begin(search: Search, percept: Percept, goal: Place) -> Search:
     """Return a search that starts anew from where the robot is; the way in force stays.
 
-    `search`: the last one. `percept`: only the pose is used. `goal`: in odometry's frame, m.
+    Parameters
+    ----------
+    search : Search
+        The last one.
+    percept : Percept
+        Only the pose is used.
+    goal : tuple of float
+        In odometry's frame, m.
     """
     pose = percept.pose
     root = Node(pose.x, pose.y, pose.theta / SECTOR_RAD, 0.0, -1)
@@ -262,8 +269,14 @@ def _turns_back(search: Search, way: list[Place], carrot_m: float) -> bool:
 def carrot(search: Search, x: float, y: float, ahead_m: float) -> Place | None:
     """Return the place some way ahead on the way in force; None without a way, or far from it.
 
-    `x`, `y`: where the robot is, in odometry's frame, m. `ahead_m`: how far ahead, along the way from the point of it
-    that is nearest to the robot, m.
+    Parameters
+    ----------
+    search : Search
+        The search.
+    x, y : float
+        Where the robot is, in odometry's frame, m.
+    ahead_m : float
+        How far ahead, along the way from the point of it that is nearest to the robot, m.
     """
     nearest, leg, rest_m = AWAY_M, -1, 0.0
     way = search.way

@@ -154,7 +154,12 @@ def fill_cells(
 def room_m(cells: Cells, body_radius_m: float, room_max_m: float) -> float:
     """Return the radius of the disc that is driven along a direction: the wanted one, or what there is room for.
 
-    `cells`: around the robot. `body_radius_m`, `room_max_m`: the least and the wanted radius, m.
+    Parameters
+    ----------
+    cells : Cells
+        Around the robot.
+    body_radius_m, room_max_m : float
+        The least and the wanted radius, m.
     """
     nearest = float(cells.distances.min(initial=math.inf)) - FIRM_M
     return min(room_max_m, max(body_radius_m, nearest))

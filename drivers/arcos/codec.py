@@ -71,7 +71,10 @@ def checksum(body: bytes) -> int:
 def frame(body: bytes) -> bytes:
     """Return a body with header, length and checksum.
 
-    Raises `ValueError`: the body is empty or too long for one frame.
+    Raises
+    ------
+    ValueError
+        The body is empty or too long for one frame.
     """
     if not 1 <= len(body) <= BODY_MAX:
         raise ValueError(f"a body of {len(body)} bytes: a frame holds 1 to {BODY_MAX}")
@@ -81,8 +84,10 @@ def frame(body: bytes) -> bytes:
 def encode(message: Command | Packet) -> bytes:
     """Return the bytes of a command or packet.
 
-    Raises `ValueError`: a field does not fit, or the whole is longer than a frame; the message names the type and the
-    cause.
+    Raises
+    ------
+    ValueError
+        A field does not fit, or the whole is longer than a frame; the message names the type and the cause.
     """
     body = _command_body(message) if isinstance(message, Command) else _packet_body(message)
     return frame(body)
@@ -168,7 +173,10 @@ def _io_blocks(data: bytes) -> tuple[bytes, bytes, tuple[int, ...], bytes] | Non
 def _command_body(command: Command) -> bytes:
     """Return the body of a command.
 
-    Raises `ValueError`: a field does not fit its bytes.
+    Raises
+    ------
+    ValueError
+        A field does not fit its bytes.
     """
     number = pack_integer(command, "number", "B", command.number)
     match command.argument:
@@ -188,7 +196,10 @@ def _command_body(command: Command) -> bytes:
 def _packet_body(packet: Packet) -> bytes:
     """Return the body of a packet.
 
-    Raises `ValueError`: a field does not fit its bytes.
+    Raises
+    ------
+    ValueError
+        A field does not fit its bytes.
     """
     match packet:
         case SyncEcho():

@@ -65,7 +65,11 @@ class ArcosDevice(EventDevice):
     """A `drivers.emulator.robot_device.RobotDevice` that speaks the protocol of the Pioneer family.
 
     `firmware` has its names, factors and flash settings.
-    Raises `DriverError`: the robot file describes a synchro drive.
+
+    Raises
+    ------
+    DriverError
+        The robot file describes a synchro drive.
     """
 
     # Reset by a restart; see `_boot`.

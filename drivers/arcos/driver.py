@@ -178,8 +178,10 @@ class ArcosDriver(Session[PoseStamper]):
     def set_firing(self, ring: RingConfig) -> None:
         """Change the firing pattern to that of `ring`; does nothing if it is the current one.
 
-        Raises `drivers.firing_pattern.FiringError`: the ring or the robot's arrays cannot carry out the pattern; the
-        current one stays.
+        Raises
+        ------
+        drivers.firing_pattern.FiringError
+            The ring or the robot's arrays cannot carry out the pattern; the current one stays.
         """
         polling = polling_of(self._config.model_copy(update={"ring": ring}), self._discs)
         if polling == self._polling:

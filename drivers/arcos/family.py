@@ -43,7 +43,10 @@ def make_device(
 def firmware_of(config: RobotConfig) -> Firmware:
     """Return the flash settings of an emulated robot that the robot file describes.
 
-    Raises `DriverError`: the numbers of the discs do not fit the ring.
+    Raises
+    ------
+    DriverError
+        The numbers of the discs do not fit the ring.
     """
     arcos = config.arcos
     return Firmware(

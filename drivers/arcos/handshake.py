@@ -60,8 +60,12 @@ class Stage(Enum):
 class Handshake:
     """One attempt after the other to start a session; a sans-I/O object like the driver.
 
-    `link`: gives the speed that the line should have, and the robot's time to answer. `has_speed`: whether the line
-    has a speed that can be changed, as a socket has not.
+    Parameters
+    ----------
+    link
+        Gives the speed that the line should have, and the robot's time to answer.
+    has_speed
+        Whether the line has a speed that can be changed, as a socket has not.
 
     Attributes
     ----------

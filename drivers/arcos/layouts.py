@@ -117,7 +117,10 @@ _STRUCTS: Final = MappingProxyType({code: struct.Struct("<" + code) for code in 
 def pack_integer(message: object, field: str, code: str, value: int) -> bytes:
     """Return the bytes of one integer.
 
-    Raises `ValueError`: it does not fit.
+    Raises
+    ------
+    ValueError
+        It does not fit.
     """
     try:
         return _STRUCTS[code].pack(value)
@@ -128,7 +131,10 @@ def pack_integer(message: object, field: str, code: str, value: int) -> bytes:
 def pack(message: object, layout: Layout) -> bytes:
     """Return the bytes of the fields up to the first that is None.
 
-    Raises `ValueError`: a value does not fit its field.
+    Raises
+    ------
+    ValueError
+        A value does not fit its field.
     """
     out = bytearray()
     for field, code in layout:

@@ -50,7 +50,10 @@ class Polling(NamedTuple):
 def discs_of(config: RobotConfig) -> tuple[int, ...]:
     """Return the robot's number of each sensor of the ring.
 
-    Raises `DriverError`: there are more or fewer of them than sensors, or one twice.
+    Raises
+    ------
+    DriverError
+        There are more or fewer of them than sensors, or one twice.
     """
     count, discs = len(config.ring.mounts), config.arcos.discs
     if discs is None:
@@ -66,8 +69,10 @@ def discs_of(config: RobotConfig) -> tuple[int, ...]:
 def polling_of(config: RobotConfig, discs: tuple[int, ...]) -> Polling:
     """Return the ring's firing pattern as a polling sequence.
 
-    Raises `FiringError`: the ring cannot carry out the pattern, or the robot: each array fires one disc at a time,
-    all in parallel.
+    Raises
+    ------
+    FiringError
+        The ring cannot carry out the pattern, or the robot: each array fires one disc at a time, all in parallel.
     """
     pattern = firing_pattern(config.ring)
     steps = [tuple(discs[sensor] for sensor in sensors(mask)) for mask in pattern.masks]
@@ -83,7 +88,10 @@ def polling_of(config: RobotConfig, discs: tuple[int, ...]) -> Polling:
 def _check_arrays(steps: list[tuple[int, ...]]) -> None:
     """Check that each firing has one disc of each array, all of the same arrays.
 
-    Raises `FiringError`: one does not.
+    Raises
+    ------
+    FiringError
+        One does not.
     """
     arrays = [sorted(disc // DISCS_PER_ARRAY for disc in step) for step in steps]
     if any(step != arrays[0] or len(set(step)) != len(step) for step in arrays):
@@ -97,7 +105,10 @@ def _check_arrays(steps: list[tuple[int, ...]]) -> None:
 def _cycle_ms(pattern: FiringPattern) -> int:
     """Return the time from one firing to the next as the robot counts it.
 
-    Raises `FiringError`: it is too short or too long for the robot.
+    Raises
+    ------
+    FiringError
+        It is too short or too long for the robot.
     """
     cycle_ms = math.ceil(1e3 * pattern.step_period_s - _ROUNDING)
     if not CYCLE_MIN_MS <= cycle_ms <= CYCLE_MAX_MS:

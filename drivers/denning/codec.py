@@ -135,7 +135,11 @@ def encode(frame: Frame, seq: int | None = None) -> bytes:
     """Return the bytes of a frame, its closing zero included.
 
     The number `seq` replaces the frame's own.
-    Raises `ValueError`: a field does not fit; the message names the field, its value and its range.
+
+    Raises
+    ------
+    ValueError
+        A field does not fit; the message names the field, its value and its range.
     """
     layout = _BY_CLASS[type(frame)]
     body = bytes((layout.type, _checked(frame, "seq", frame.seq if seq is None else seq, 0, 0xFF)))

@@ -55,7 +55,11 @@ class DenningDevice(EventDevice):
     """A `drivers.emulator.robot_device.RobotDevice` that speaks the ring-and-base protocol.
 
     Its own clock begins at `clock_start_us`: 0 on a real robot, near 2³² to see it wrap soon.
-    Raises `DriverError`: the ring has more sensors than the protocol's masks have bits.
+
+    Raises
+    ------
+    DriverError
+        The ring has more sensors than the protocol's masks have bits.
     """
 
     # Reset by a restart; see `_boot`.

@@ -147,8 +147,10 @@ class DenningDriver(Session[PoseStamper]):
     def set_firing(self, ring: RingConfig) -> None:
         """Change the firing pattern to that of `ring`; does nothing if it is the current one.
 
-        Raises `drivers.firing_pattern.FiringError`: the ring cannot carry out the pattern, or the protocol cannot
-        express it; the current one stays.
+        Raises
+        ------
+        drivers.firing_pattern.FiringError
+            The ring cannot carry out the pattern, or the protocol cannot express it; the current one stays.
         """
         pattern, listeners = wire_pattern(ring), firing_pattern(ring).listeners
         if (pattern, listeners) == (self._pattern, self._listeners):

@@ -53,7 +53,11 @@ def refuse_overload(
     """Raise an error if the line is too slow for the traffic.
 
     Arguments are as of `sent_bytes_s`.
-    Raises `FiringError`: it is too slow.
+
+    Raises
+    ------
+    FiringError
+        It is too slow.
     """
     step_s = 1e-3 * pattern.step_period_ms
     refuse_slow_line(link, odometry_bytes_s(), _firing_bytes(pattern, listeners, version, sweeps), step_s)

@@ -55,7 +55,10 @@ class Rotation:
     def set_listeners(self, masks: tuple[int, ...]) -> bool:
         """Let the sensors of `masks` listen, one mask a step of the newest pattern; without masks, none.
 
-        Returned: False, and nothing changes, if the masks do not fit the pattern.
+        Returns
+        -------
+        bool
+            False, and nothing changes, if the masks do not fit the pattern.
         """
         newest = self._next_pattern or self._pattern
         fired = () if newest is None else newest.masks

@@ -37,7 +37,10 @@ class EchoReporter:
     def set_scan(self, sweeps: tuple[Sweep, ...]) -> bool:
         """Let servos scan from their first bearing on; without sweeps they stand there, and echoes have no bearings.
 
-        Returned: False, and nothing changes, if a servo of the ring does not go to all bearings of its sweep.
+        Returns
+        -------
+        bool
+            False, and nothing changes, if a servo of the ring does not go to all bearings of its sweep.
         """
         reachable = all(
             0 <= sweep.sensor < len(self._views.on_servo)

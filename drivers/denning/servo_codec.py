@@ -14,7 +14,10 @@ _MASK_BYTES: Final = 3
 def encode_servo_tail(frame: Scan | Echo3) -> bytes:
     """Return the bytes of a frame after its fixed fields.
 
-    Raises `ValueError`: a value does not fit; the message names the frame.
+    Raises
+    ------
+    ValueError
+        A value does not fit; the message names the frame.
     """
     try:
         return _scan_tail(frame) if isinstance(frame, Scan) else _echo3_tail(frame)
@@ -25,7 +28,10 @@ def encode_servo_tail(frame: Scan | Echo3) -> bytes:
 def _scan_tail(frame: Scan) -> bytes:
     """Return the bytes of a SCAN after its fixed ones.
 
-    Raises `ValueError`: it has too many sweeps, or none.
+    Raises
+    ------
+    ValueError
+        It has too many sweeps, or none.
     """
     if not 1 <= len(frame.sweeps) <= SWEEPS_MAX:
         raise ValueError(f"{len(frame.sweeps)} sweeps, expected 1 to {SWEEPS_MAX}")
@@ -35,7 +41,10 @@ def _scan_tail(frame: Scan) -> bytes:
 def _echo3_tail(frame: Echo3) -> bytes:
     """Return the bytes of an ECHO3 after its fixed ones.
 
-    Raises `ValueError`: masks, counts and bearings do not fit each other.
+    Raises
+    ------
+    ValueError
+        Masks, counts and bearings do not fit each other.
     """
     sizes = frame.fired.bit_count(), frame.turned.bit_count()
     if frame.turned & ~frame.fired or (len(frame.counts), len(frame.bearings)) != sizes:

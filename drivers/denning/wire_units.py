@@ -54,7 +54,11 @@ def wire_pattern(ring: RingConfig) -> WirePattern:
 
     The step is rounded up to whole milliseconds and the window down to whole tenths of a foot, so that a step stays
     long enough for its window.
-    Raises `FiringError`: the ring cannot carry out the pattern, or the protocol cannot express it.
+
+    Raises
+    ------
+    FiringError
+        The ring cannot carry out the pattern, or the protocol cannot express it.
     """
     pattern, masks = firing_pattern(ring), sensor_masks(ring)
     if ring.sensor_count > SENSORS_MAX:
@@ -83,7 +87,10 @@ def wire_pattern(ring: RingConfig) -> WirePattern:
 def wire_scan(ring: RingConfig) -> tuple[Sweep, ...]:
     """Return the scans of the ring's servos, in the protocol's units; none without servos.
 
-    Raises `FiringError`: they are more than the protocol has room for.
+    Raises
+    ------
+    FiringError
+        They are more than the protocol has room for.
     """
     sweeps = []
     for number, sensor in enumerate(ring.sensors or ()):
@@ -107,7 +114,10 @@ def sweep_bearing(sweep: Sweep, number: int) -> int:
 def newest_version(config: RobotConfig) -> int:
     """Return the newest version of the protocol to speak with the robot.
 
-    Raises `DriverError`: the robot file names one that does not exist.
+    Raises
+    ------
+    DriverError
+        The robot file names one that does not exist.
     """
     version = config.robot.protocol or VERSION
     if version > VERSION:
@@ -121,7 +131,11 @@ def emulated_version(config: RobotConfig) -> int:
     """Return the newest version of the protocol that the emulated robot speaks.
 
     It is the one that the robot file names, or else 1 if that can express the ring and its firing pattern.
-    Raises `DriverError`: the robot file names one that does not exist.
+
+    Raises
+    ------
+    DriverError
+        The robot file names one that does not exist.
     """
     version, ring = newest_version(config), config.ring
     in_tenths = ring.resolution_m >= TENTH_FT_M - _ROUNDING

@@ -44,7 +44,10 @@ def board_files(board: Board) -> dict[str, str]:
 def read_config(text: str, place: str) -> dict[str, Any]:
     """Return the values of a robot_config.py, which is read and not executed.
 
-    Raises `FirmwareError`: it is no Python, or a value is no constant.
+    Raises
+    ------
+    FirmwareError
+        It is no Python, or a value is no constant.
     """
     values: dict[str, Any] = {}
     try:
@@ -69,7 +72,11 @@ def robot_file(values: Mapping[str, Any], place: str) -> str:
     """Return the text of the robot file for a board's configuration.
 
     `values` are as of `read_config`; `place` names the configuration's file in messages.
-    Raises `FirmwareError`: a value is missing or out of its range.
+
+    Raises
+    ------
+    FirmwareError
+        A value is missing or out of its range.
     """
     try:
         text = _render(values)
@@ -92,7 +99,10 @@ def robot_file(values: Mapping[str, Any], place: str) -> str:
 def check_pins(values: Mapping[str, Any], board: Board, place: str) -> None:
     """Check that the board can time the echoes of each set of sensors that fire together.
 
-    Raises `FirmwareError`: it cannot; the message says what to change.
+    Raises
+    ------
+    FirmwareError
+        It cannot; the message says what to change.
     """
     if values.get("ECHO_TIMING") not in ("irq", "pio") or (values["ECHO_TIMING"] == "pio" and board != "pico"):
         possible = '"pio" or "irq"' if board == "pico" else '"irq"'
@@ -124,7 +134,10 @@ def _scan(servo: Sequence[float] | None) -> str:
 def _render(values: Mapping[str, Any]) -> str:
     """Return the robot file of a robot_config.py's values.
 
-    Raises `ValueError`: they contradict each other.
+    Raises
+    ------
+    ValueError
+        They contradict each other.
     """
     for i, (kind, *wires) in enumerate(values["SENSORS"]):
         if kind not in (*_ON_I2C, *_PULSED) or len(wires) != (1 if kind in _ON_I2C else 2):

@@ -107,7 +107,10 @@ class LineDriver(Session[LineStamper]):
     def set_firing(self, ring: RingConfig) -> None:
         """Change the firing pattern, if it is another one.
 
-        Raises `drivers.firing_pattern.FiringError`: the ring cannot fire that way.
+        Raises
+        ------
+        drivers.firing_pattern.FiringError
+            The ring cannot fire that way.
         """
         pattern = firing_pattern(ring)
         if pattern != self._pattern:
@@ -148,7 +151,10 @@ class LineDriver(Session[LineStamper]):
     def _moved(self, said: Sample, robot_s: float) -> None:
         """Take in a sample of the odometry: the first makes the line READY; one with an earlier time is a restart.
 
-        Raises `ValueError`: a number is not finite.
+        Raises
+        ------
+        ValueError
+            A number is not finite.
         """
         numbers = (robot_s, said.pose.x, said.pose.y, said.pose.theta, said.twist.v, said.twist.w)
         if not all(math.isfinite(number) for number in numbers):

@@ -64,7 +64,10 @@ class LineStamper(Stamper):
     def fired(self, robot_s: float, said: Ranges) -> None:
         """Let a firing wait for the sample after it.
 
-        Raises `ValueError`: the ring has no such sensor.
+        Raises
+        ------
+        ValueError
+            The ring has no such sensor.
         """
         if not all(0 <= sensor < self._sensors for sensor in said.ranges_m):
             raise ValueError("no such sensor")

@@ -106,7 +106,10 @@ def checksum(body: bytes | bytearray) -> int:
 def encode(frame: Frame) -> bytes:
     """Return the bytes of a frame.
 
-    Raises `ValueError`: the data is longer than a frame holds.
+    Raises
+    ------
+    ValueError
+        The data is longer than a frame holds.
     """
     if len(frame.data) > 0xFF:
         raise ValueError(f"{len(frame.data)} bytes of data: a frame holds at most 255")

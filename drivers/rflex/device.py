@@ -70,7 +70,10 @@ _I32 = 1 << 32
 class RflexDevice(EventDevice):
     """A `drivers.emulator.robot_device.RobotDevice` that speaks the rFLEX protocol.
 
-    Raises `DriverError`: the sonar banks do not fit the ring.
+    Raises
+    ------
+    DriverError
+        The sonar banks do not fit the ring.
     """
 
     # Reset by a restart; see `_boot`.

@@ -193,8 +193,10 @@ class RflexDriver(Session[Measurements]):
     def set_firing(self, ring: RingConfig) -> None:
         """Change the firing pattern to that of `ring`; does nothing if it is the current one.
 
-        Raises `drivers.firing_pattern.FiringError`: the ring or the controller cannot carry out the pattern; the
-        current one stays.
+        Raises
+        ------
+        drivers.firing_pattern.FiringError
+            The ring or the controller cannot carry out the pattern; the current one stays.
         """
         pattern = pattern_of(self._config, ring)
         if pattern != self._pattern:

@@ -36,7 +36,10 @@ class SonarPattern(NamedTuple):
 def sonar_ids(config: RobotConfig) -> tuple[int, ...]:
     """Return the id of each sensor of the ring.
 
-    Raises `DriverError`: the banks hold more or fewer sonars than the ring, or there are too many banks.
+    Raises
+    ------
+    DriverError
+        The banks hold more or fewer sonars than the ring, or there are too many banks.
     """
     rflex, count = config.rflex, len(config.ring.mounts)
     if sum(rflex.banks) != count or rflex.first_bank + len(rflex.banks) > BANKS_MAX:
@@ -55,8 +58,10 @@ def sonar_ids(config: RobotConfig) -> tuple[int, ...]:
 def pattern_of(config: RobotConfig, ring: RingConfig) -> SonarPattern:
     """Return the firing pattern of a ring as delays of the controller.
 
-    Raises `FiringError`: the ring cannot carry out the pattern, or the controller: it fires one sonar of each bank at
-    a time, in order.
+    Raises
+    ------
+    FiringError
+        The ring cannot carry out the pattern, or the controller: it fires one sonar of each bank at a time, in order.
     """
     pattern = firing_pattern(ring)
     ids = sonar_ids(config)

@@ -27,7 +27,10 @@ OPEN_TIMEOUT_S = 30.0
 def make_driver(config: RobotConfig) -> RobotDriver:
     """Return the host's end; see `drivers.registry.make_driver`.
 
-    Raises `DriverError`: the robot file lacks a sensor's frame, or describes a ring that does not turn with the base.
+    Raises
+    ------
+    DriverError
+        The robot file lacks a sensor's frame, or describes a ring that does not turn with the base.
     """
     frames, sensors = len(config.ros2.frames), len(config.ring.mounts)
     if frames not in {0, sensors}:

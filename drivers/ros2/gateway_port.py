@@ -24,7 +24,10 @@ _BUFFER_BYTES: Final = 16_384
 class GatewayPort(TcpPort):
     """An open line; opening blocks until ROS has found the robot's odometry.
 
-    Raises `GatewayError`: ROS is not installed, or the robot's topics are not there.
+    Raises
+    ------
+    GatewayError
+        ROS is not installed, or the robot's topics are not there.
     """
 
     def __init__(self, config: RobotConfig) -> None:
@@ -54,7 +57,10 @@ class GatewayPort(TcpPort):
     def _await_ready(self) -> None:
         """Wait until the process says that the robot is there.
 
-        Raises `GatewayError`: it says why not, or nothing.
+        Raises
+        ------
+        GatewayError
+            It says why not, or nothing.
         """
         self._socket.settimeout(_ANSWER_MAX_S)
         line = b""

@@ -82,8 +82,14 @@ def _polygon_model(owner: BayesPerception) -> Bound:
 class BayesPerception:
     """Detection of objects from echoes by comparing all explanations on the raw ranges.
 
-    `ring`: the sensors. `models`: the models to detect: circles by their radius, open and closed polygons by their
-    outline. `config`: the settings that a user may change.
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    models : sequence of ModelConfig
+        The models to detect: circles by their radius, open and closed polygons by their outline.
+    config : BayesConfig
+        The settings that a user may change.
     """
 
     SCRATCH: Final = ("_sure", "_last_reported", "_reported", "_readings")

@@ -68,7 +68,12 @@ class BeamFit:
 def fit_beams(looks: Looks, sensors: int) -> BeamFit:
     """Return the directions and the common width that explain the looks best.
 
-    `looks`: those of all sensors. `sensors`: number of sensors of the ring.
+    Parameters
+    ----------
+    looks
+        Those of all sensors.
+    sensors
+        Number of sensors of the ring.
     """
     half_angle, everything = best_beam(looks, sensors)
     return fit_directions(looks, sensors, half_angle, everything=everything)
@@ -77,7 +82,10 @@ def fit_beams(looks: Looks, sensors: int) -> BeamFit:
 def best_beam(looks: Looks, sensors: int) -> tuple[float, bool]:
     """Return half of the likeliest beam's opening, rad, and whether all in it answers.
 
-    `looks`, `sensors`: as for `fit_beams`.
+    Parameters
+    ----------
+    looks, sensors
+        As for `fit_beams`.
     """
     coarse = _turns(TURN_STEPS_RAD[0])
     half_angle, everything = _likeliest(looks, sensors, coarse, HALF_ANGLES_RAD, (False, True))
@@ -88,8 +96,14 @@ def best_beam(looks: Looks, sensors: int) -> tuple[float, bool]:
 def fit_directions(looks: Looks, sensors: int, half_angle: float, *, everything: bool) -> BeamFit:
     """Return the directions that explain the looks best, of sensors whose beam is known.
 
-    `looks`, `sensors`: as for `fit_beams`. `half_angle`: half of the beam's opening, rad. `everything`: whether all
-    in the beam answers, not only mirrors.
+    Parameters
+    ----------
+    looks, sensors
+        As for `fit_beams`.
+    half_angle
+        Half of the beam's opening, rad.
+    everything
+        Whether all in the beam answers, not only mirrors.
     """
     fine = _turns(TURN_STEPS_RAD[1])
     likelihood = _likelihoods(looks, sensors, fine, half_angle, everything=everything)

@@ -60,8 +60,14 @@ class Drive:
     def path(self, scales: Scales, bends: Floats, *, synchro: bool) -> Path:
         """Return the true path under these errors of the odometry; it begins at the first reported pose.
 
-        `scales`: those of distance and turn count. `bends`, shape (knots,): turn that the odometry has missed between
-        a knot and the one before, rad. `synchro`: the ring does not turn with the wheels.
+        Parameters
+        ----------
+        scales : Scales
+            Those of distance and turn count.
+        bends : (knots,) float
+            Turn that the odometry has missed between a knot and the one before, rad.
+        synchro : bool
+            The ring does not turn with the wheels.
         """
         x, y, reported = self.poses.T
         missed = np.interp(self.way_m, KNOT_M * np.arange(len(bends) + 1), np.concatenate([[0.0], np.cumsum(bends)]))
@@ -78,8 +84,12 @@ class Drive:
 def drive_of(firings: Sequence[Firing], range_min_m: float) -> Drive:
     """Return the drive of these firings, at least two.
 
-    `firings`: oldest first. `range_min_m`: ranges up to here are left out: a surface may be nearer than the least
-    range.
+    Parameters
+    ----------
+    firings
+        Oldest first.
+    range_min_m
+        Ranges up to here are left out: a surface may be nearer than the least range.
     """
     poses = np.array([(firing.pose.x, firing.pose.y, firing.pose.theta) for firing in firings])
     poses[:, 2] = np.unwrap(poses[:, 2])

@@ -97,8 +97,14 @@ class GeometryFit:
 def sensors_at(path: Path, echoes: Echoes, mounts: Floats, angles: Floats) -> Beams:
     """Return where the sensors of readings stand and look.
 
-    `path`: the poses of the ring. `echoes`: the readings, shape (m,). `mounts`, `angles`: place (m), shape (n, 2),
-    and direction (rad), shape (n,), of each sensor in the ring's frame.
+    Parameters
+    ----------
+    path
+        The poses of the ring.
+    echoes
+        The readings, shape (m,).
+    mounts, angles
+        Place (m), shape (n, 2), and direction (rad), shape (n,), of each sensor in the ring's frame.
     """
     yaw, centre, mount = path.yaw[echoes.firing], path.xy[echoes.firing], mounts[echoes.sensor]
     c, s = np.cos(yaw), np.sin(yaw)

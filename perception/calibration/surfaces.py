@@ -113,7 +113,10 @@ def _explained(found: Surfaces, beams: Beams, ranges: Floats, half_angle: float)
 def most_voted_wall(beams: Beams, ranges: Floats, half_angle: float) -> tuple[int, tuple[float, float]]:
     """Return how many readings vote for the line that has most of them, and its normal's direction and offset.
 
-    `beams`, `ranges`, `half_angle`: as for `find_surfaces`.
+    Parameters
+    ----------
+    beams, ranges, half_angle
+        As for `find_surfaces`.
     """
     best, wall = 0, (0.0, 0.0)
     for angle in np.linspace(-math.pi, math.pi, NORMAL_DIRECTIONS, endpoint=False):

@@ -42,7 +42,12 @@ SHIFT_MIN_M: Final = 0.002
 class MapFrame(OdometryFrame):
     """Poses corrected by what is recognised, and conversions between the frames.
 
-    `ring`: the sensors. `models`: the objects to recognise; the round ones become landmarks.
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    models : sequence of ModelConfig
+        The objects to recognise; the round ones become landmarks.
     """
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig]) -> None:

@@ -24,8 +24,12 @@ START: Final = 16
 class Archive:
     """Records with a number and a place, under a grid.
 
-    `dtype`: of a record; its fields `number` (int), `x` and `y` (m) are used here. `row_bounds`: bounds of its
-    fields.
+    Parameters
+    ----------
+    dtype : dtype
+        Of a record; its fields `number` (int), `x` and `y` (m) are used here.
+    row_bounds : mapping
+        Bounds of its fields.
     """
 
     SCRATCH: Final = ("_cells", "_index")
@@ -58,7 +62,10 @@ class Archive:
     def take(self, number: int) -> Structured:
         """Remove a record and return it, shape (1,).
 
-        Raises `KeyError`: there is none of this number.
+        Raises
+        ------
+        KeyError
+            There is none of this number.
         """
         at, last = self._index[number], self.count - 1
         row: Structured = self.archived_rows[at : at + 1].copy()
@@ -76,7 +83,10 @@ class Archive:
     def near(self, x: float, y: float, radius: float) -> list[int]:
         """Return the numbers of the records within `radius` of (x, y), m, the nearest first.
 
-        `x`, `y`, `radius`: m.
+        Parameters
+        ----------
+        x, y, radius : float
+            m.
         """
         found: list[int] = []
         low, high = self._cell(x - radius, y - radius), self._cell(x + radius, y + radius)

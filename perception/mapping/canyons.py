@@ -154,7 +154,14 @@ def _bridges(pieces: Floats, circles: Floats, sealed_m: float) -> Floats:
 def canyon_round(x: float, y: float, surfaces: Surfaces, sealed_m: float) -> Canyon | None:
     """Return the canyon that a place lies in, without a number; None if it lies in none.
 
-    `x`, `y`: the place, m. `surfaces`: from `surfaces_of`. `sealed_m`: as for `surfaces_of`.
+    Parameters
+    ----------
+    x, y
+        The place, m.
+    surfaces
+        From `surfaces_of`.
+    sealed_m
+        As for `surfaces_of`.
     """
     angles, points, items, weights = _seen_from(x, y, surfaces)
     ranges = np.hypot(points[:, 0] - x, points[:, 1] - y)
@@ -297,7 +304,12 @@ class CanyonMap:
     def refine(self, seen: Iterable[DetectedObject], radii_m: Mapping[str, float]) -> None:
         """Examine the next place: in turn that of the robot, a known canyon's, and one before a wall.
 
-        `seen`: what perception reports near it. `radii_m`: radius by label of round models.
+        Parameters
+        ----------
+        seen
+            What perception reports near it.
+        radii_m
+            Radius by label of round models.
         """
         self.is_due = False
         at_x, at_y = self._at.tolist()

@@ -62,7 +62,10 @@ class NoSurfaces:
     ) -> SurfaceReport:
         """Return walls and polylines beside what the method reports; the same tuples until they change.
 
-        `known`: returns what the method reports.
+        Parameters
+        ----------
+        known : callable
+            Returns what the method reports.
         """
         return SurfaceReport()
 

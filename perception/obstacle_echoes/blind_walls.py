@@ -77,8 +77,15 @@ def misses_all_of(one: BlindWall, off: float, half_angle: float) -> bool:
     """Enter that a beam misses the wall of a direction, and return whether beams have now missed it in all of that.
 
     One beam may hold but a part of a direction, and the next one the rest.
-    `one`: what is remembered of the direction. Updated. `off`: angle from the beam's axis to the direction, rad.
-    `half_angle`: half the width of a beam, rad.
+
+    Parameters
+    ----------
+    one : record
+        What is remembered of the direction. Updated.
+    off : float
+        Angle from the beam's axis to the direction, rad.
+    half_angle : float
+        Half the width of a beam, rad.
     """
     low, high = off - 0.5 * WIDTH_RAD, off + 0.5 * WIDTH_RAD
     if low >= -half_angle:
@@ -92,7 +99,10 @@ def misses_all_of(one: BlindWall, off: float, half_angle: float) -> bool:
 def forget_ahead(x: float, y: float, heading: float, walls: Records[BlindWall]) -> None:
     """Forget the directions ahead into which the ring looked from too far away.
 
-    `x`, `y`, `heading`, `walls`: as of `enter_looks`.
+    Parameters
+    ----------
+    x, y, heading, walls
+        As of `enter_looks`.
     """
     least = KEPT_M
     for _ in range(2):
@@ -164,8 +174,14 @@ def enter_looks(
 class BlindWalls:
     """The walls that a ring heard in each direction.
 
-    `mounts`, shape (n, 3): x, y (m), direction (rad) of each sensor in the ring's frame. `half_angle`: half the width
-    of a beam, rad. `turning`: the sensors that turn with the wheels, as `config.robot.RingConfig.turning`.
+    Parameters
+    ----------
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor in the ring's frame.
+    half_angle : float
+        Half the width of a beam, rad.
+    turning : tuple of int
+        The sensors that turn with the wheels, as `config.robot.RingConfig.turning`.
     """
 
     SCRATCH: Final = ("records",)
@@ -209,7 +225,13 @@ class BlindWalls:
         """Return what is known of the directions in which no sensor looks now, and what is not, within 90° of ahead.
 
         Walls behind count, too: one that no longer counted once it was abeam made a robot beside it turn to and fro.
-        `pose`: the robot's now. `axes_rad`, shape (n,): the axis of each sensor now, in the odometry's frame, rad.
+
+        Parameters
+        ----------
+        pose : Pose
+            The robot's now.
+        axes_rad : (n,) float
+            The axis of each sensor now, in the odometry's frame, rad.
 
         Returns
         -------
@@ -245,8 +267,12 @@ class BlindWalls:
     def look_again(self, x: float, y: float, is_lasting: bool) -> None:
         """Have the robot look where it last looked from farther than `SILENT_WAY_M` away; walls stay remembered.
 
-        `x`, `y`: place of the ring, which has lost what it heard and hears nothing else, m: few sensors often do.
-        `is_lasting`: whether it has for long: then the robot looks everywhere, once.
+        Parameters
+        ----------
+        x, y
+            Place of the ring, which has lost what it heard and hears nothing else, m: few sensors often do.
+        is_lasting
+            Whether it has for long: then the robot looks everywhere, once.
         """
         walls, has_looked = self._walls, self.has_looked_round
         if is_lasting and not has_looked:
@@ -256,7 +282,10 @@ class BlindWalls:
     def offsets(self, x: float, y: float) -> Floats:
         """Return the distance of each direction's wall from the odometry's origin, m; infinite without one.
 
-        `x`, `y`: place of the ring, m.
+        Parameters
+        ----------
+        x, y
+            Place of the ring, m.
         """
         offsets, directions = self._walls["offset"], WIDTH_RAD * np.arange(TURN_DIRECTIONS)
         away = offsets - x * np.cos(directions) - y * np.sin(directions)
@@ -272,7 +301,11 @@ def middle_walls(offsets_m: Floats) -> Floats:
     """Return the offsets of the walls in the middle of each run of neighbours that are one wall; others infinite, m.
 
     An echo stands for a wall in each direction of its beam: of neighbours at one distance those in the middle count.
-    `offsets_m`, shape (`TURN_DIRECTIONS`,): as of `BlindWalls.offsets`.
+
+    Parameters
+    ----------
+    offsets_m : (`TURN_DIRECTIONS`,) float
+        As of `BlindWalls.offsets`.
     """
     middles, is_wall = np.full(TURN_DIRECTIONS, math.inf), np.isfinite(offsets_m)
     finite = np.where(is_wall, offsets_m, 0.0)
@@ -292,7 +325,10 @@ def middle_walls(offsets_m: Floats) -> Floats:
 def has_blind_sides(mounts: Floats, half_angle: float) -> bool:
     """Return whether a ring has a gap as wide as a beam, so that the robot must look into it; narrower ones close.
 
-    `mounts`, `half_angle`: as of `BlindWalls`.
+    Parameters
+    ----------
+    mounts, half_angle
+        As of `BlindWalls`.
     """
     return widest_gap(mounts) > 4.0 * half_angle
 
@@ -300,7 +336,10 @@ def has_blind_sides(mounts: Floats, half_angle: float) -> bool:
 def widest_gap(mounts: Floats) -> float:
     """Return the greatest angle between the axes of neighbouring sensors, rad.
 
-    `mounts`, shape (n, 3): as of `BlindWalls`.
+    Parameters
+    ----------
+    mounts : (n, 3) float
+        As of `BlindWalls`.
     """
     axes = np.sort(np.remainder(mounts[:, 2], math.tau))
     return float(np.diff(axes, append=axes[0] + math.tau).max())

@@ -71,7 +71,14 @@ class KeptLooks(NamedTuple):
 def is_steady(kept: KeptLooks, px: float, py: float, t: float) -> bool:
     """Return whether a look not long before put an echo near a place.
 
-    `px`, `py`: the place, m. `t`: time of the firing, s.
+    Parameters
+    ----------
+    kept : KeptLooks
+        The looks.
+    px, py : float
+        The place, m.
+    t : float
+        Time of the firing, s.
     """
     points, times, heard = kept.points, kept.times, kept.heard
     for j in range(times.shape[0]):
@@ -86,8 +93,12 @@ def is_steady(kept: KeptLooks, px: float, py: float, t: float) -> bool:
 def forget_look(bearing: float, same: float, bearings: Floats, times: Floats, heard: NDArray[np.bool_]) -> int:
     """Forget the echoes of a sensor that a new look replaces, and return which of its looks is the least use.
 
-    `bearing`, `same`: direction of the new look, and the angle up to which others are in the same one, rad.
-    `bearings`, `times`, `heard`: as in `KeptLooks`, of this sensor. Updated.
+    Parameters
+    ----------
+    bearing, same
+        Direction of the new look, and the angle up to which others are in the same one, rad.
+    bearings, times, heard : (looks,)
+        As in `KeptLooks`, of this sensor. Updated.
     """
     oldest = 0  # of all
     first = -1  # the oldest in the same direction, and the one after it
@@ -365,7 +376,12 @@ class FreshEchoes:
     def with_blind_sides(self, points: Floats, pose: Pose, axes_rad: Floats) -> tuple[Floats, Floats, Floats]:
         """Return echoes with those of remembered walls, the directions of which nothing is known, and presumed feet.
 
-        `points`, shape (h, 2): places of echoes, m. `pose`, `axes_rad`: as of `BlindWalls.sides`.
+        Parameters
+        ----------
+        points : (h, 2) float
+            Places of echoes, m.
+        pose, axes_rad
+            As of `BlindWalls.sides`.
         """
         if not self._walls.has_gaps:
             return points, np.zeros(0), np.zeros((0, 2))

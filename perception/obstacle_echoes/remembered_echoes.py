@@ -199,7 +199,10 @@ def find_ahead(pose: RingPose, half_width: float, echoes: Records[RememberedEcho
 class RememberedEchoes:
     """What a ring has heard in the last seconds.
 
-    `sensor_of`: as `config.robot.RingConfig.sensor_of`.
+    Parameters
+    ----------
+    sensor_of : tuple of int
+        As `config.robot.RingConfig.sensor_of`.
     """
 
     SCRATCH: Final = ("_echo_records", "_heard_records")

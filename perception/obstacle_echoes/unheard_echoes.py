@@ -234,8 +234,12 @@ def keep_sudden(
 class UnheardEchoes:
     """The echo of each sensor that it lost and that nothing has contradicted since, and what all heard lately.
 
-    `mounts`, shape (n, 3): x, y (m), direction (rad) of each sensor in the ring's frame. `sensor_of`: as of
-    `FreshEchoes`.
+    Parameters
+    ----------
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor in the ring's frame.
+    sensor_of : tuple of int
+        As of `FreshEchoes`.
     """
 
     SCRATCH: Final = ("records", "_places", "_are_steady")
@@ -269,7 +273,13 @@ class UnheardEchoes:
 
         Infinite where there is none, and while the ring hears anything new. The direction of a wall is known to that
         of its neighbours in `TURN_DIRECTIONS`, so the wall may be crossed and still count.
-        `pose`: of the disc, m and rad. `radius_m`: the disc's, m.
+
+        Parameters
+        ----------
+        pose
+            Of the disc, m and rad.
+        radius_m
+            The disc's, m.
         """
         if not self.hears_nothing_new:
             return math.inf
@@ -308,8 +318,13 @@ class UnheardEchoes:
 
         None if there is none in the robot's way so near, or if the ring has not been silent for `SILENT_ROUNDS`. Few
         sensors among mirrors are often silent for so long, and hear random echoes now and then.
-        `pose`: the robot's, in odometry's frame. `near_m`, `half_width_m`: length and half the width of the way
-        ahead, m.
+
+        Parameters
+        ----------
+        pose : Pose
+            The robot's, in odometry's frame.
+        near_m, half_width_m : float
+            Length and half the width of the way ahead, m.
         """
         if not (self.has_been_silent and self.is_ring_silent):
             return None

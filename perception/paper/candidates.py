@@ -31,8 +31,14 @@ since it was placed; the number it is known by, 0 if its cluster has too few seg
 def follow_clusters(old: Floats, new: Floats, reach: float, predecessor: Ints) -> None:
     """Find the old cluster that each new one continues: the nearest, each at most once, nearest pairs first.
 
-    `old`, `new`: centres, m. `reach`: largest distance, m. `predecessor`, shape (d,): out: index of the old cluster,
-    −1 for none.
+    Parameters
+    ----------
+    old, new : (c, 2), (d, 2) float
+        Centres, m.
+    reach : float
+        Largest distance, m.
+    predecessor : (d,) int
+        Out: index of the old cluster, −1 for none.
     """
     for j in range(new.shape[0]):
         predecessor[j] = -1
@@ -170,7 +176,10 @@ class Candidates:
     def apply_settings(self, config: RelaxationConfig, segments_min: int, reach_m: float) -> None:
         """Use other settings; if those of relaxation changed, all candidates relax again.
 
-        `config`, `segments_min`, `reach_m`: as for the class.
+        Parameters
+        ----------
+        config, segments_min, reach_m
+            As for the class.
         """
         self._segments_min, self._reach_m = segments_min, reach_m
         if config != self._config:
@@ -181,8 +190,14 @@ class Candidates:
     def extend(self, models: tuple[ObjectModel, ...], clusters: Clusters, outline: OutlineMap) -> None:
         """Try further models, which follow the present ones in `models`, at the present clusters.
 
-        `models`: the present models and the further ones. `clusters`: the present clusters. `outline`: their
-        segments.
+        Parameters
+        ----------
+        models : tuple of ObjectModel
+            The present models and the further ones.
+        clusters : Clusters
+            The present clusters.
+        outline : OutlineMap
+            Their segments.
         """
         before, self._models = len(self._models), models
         added = np.zeros((len(self.rows), len(models) - before), CANDIDATE)
@@ -203,7 +218,12 @@ class Candidates:
     def restore(self, number: int, m: int, pose: tuple[float, float, float]) -> bool:
         """Give the candidate nearest to a pose (m, rad) that pose and a number; return whether there is one.
 
-        `number`, `m`: the object's number and the index of its model. `pose`: where it had come to rest.
+        Parameters
+        ----------
+        number, m
+            The object's number and the index of its model.
+        pose : (float, float, float)
+            Where it had come to rest.
         """
         used = np.flatnonzero(self.rows["number"][: self._count, m] > 0)
         if not len(used):

@@ -36,7 +36,10 @@ class ClusterBox(NamedTuple):
 class ClusterView:
     """Groups segments as the paper's method does.
 
-    `config`: the threshold T, the least number of segments of a cluster, and the greatest number of clusters.
+    Parameters
+    ----------
+    config : PerceptionConfig
+        The threshold T, the least number of segments of a cluster, and the greatest number of clusters.
     """
 
     def __init__(self, config: PerceptionConfig) -> None:
@@ -47,7 +50,10 @@ class ClusterView:
     def boxes(self, segments: Floats) -> list[ClusterBox]:
         """Return the clusters of these segments.
 
-        `segments`, shape (n, 5): end points x1, y1, x2, y2 (m), direction of the normal (rad).
+        Parameters
+        ----------
+        segments : (n, 5) float
+            End points x1, y1, x2, y2 (m), direction of the normal (rad).
         """
         n = len(segments)
         if n == 0:

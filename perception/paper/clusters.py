@@ -121,7 +121,12 @@ def group_by_cluster(
 class Clusters:
     """The clusters of an outline map, computed again after each change of the map.
 
-    `config`: the threshold T and the largest number of clusters. `capacity`: capacity of the map.
+    Parameters
+    ----------
+    config : ClustersConfig
+        The threshold T and the largest number of clusters.
+    capacity : int
+        Capacity of the map.
     """
 
     BOUNDS: Final = bounds(

@@ -58,8 +58,14 @@ class NumberSource:
 class Placements:
     """Models that an operator placed.
 
-    `models`: the models that can be placed. `config`: the paper's constants and the bound on the work. `reach_m`:
-    segments up to half of this outside the model's outline attract it.
+    Parameters
+    ----------
+    models : tuple of ObjectModel
+        The models that can be placed.
+    config : RelaxationConfig
+        The paper's constants and the bound on the work.
+    reach_m : float
+        Segments up to half of this outside the model's outline attract it.
     """
 
     BOUNDS: Final = bounds(
@@ -85,7 +91,10 @@ class Placements:
     def apply_settings(self, models: tuple[ObjectModel, ...], config: RelaxationConfig, reach_m: float) -> None:
         """Use other settings; the present models come first in `models`.
 
-        `models`, `config`, `reach_m`: as for the class.
+        Parameters
+        ----------
+        models, config, reach_m
+            As for the class.
         """
         self._models = models
         self._config = config
@@ -188,8 +197,14 @@ class Rejections:
     def add(self, x: float, y: float, reach_m: float, model: int, newest_segment: int) -> None:
         """Add a rejection; the oldest is overwritten.
 
-        `x`, `y`, `reach_m`: the place, and how far around it the rejection applies, m. `model`: index of the model.
-        `newest_segment`: number of the newest segment in the map.
+        Parameters
+        ----------
+        x, y, reach_m : float
+            The place, and how far around it the rejection applies, m.
+        model : int
+            Index of the model.
+        newest_segment : int
+            Number of the newest segment in the map.
         """
         self.rows[self.total % PLACEMENTS_MAX] = (x, y, reach_m, model, newest_segment)
         self.total += 1
@@ -197,7 +212,12 @@ class Rejections:
     def newest_excluded(self, x: float, y: float, model: int) -> int:
         """Return the newest segment that does not count for a model at (x, y), m; 0 if all segments count.
 
-        `x`, `y`: position of the model in the odometry's frame, m. `model`: index of the model.
+        Parameters
+        ----------
+        x, y : float
+            Position of the model in the odometry's frame, m.
+        model : int
+            Index of the model.
         """
         newest = 0
         for row in self.rows[: min(self.total, PLACEMENTS_MAX)]:

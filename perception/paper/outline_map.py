@@ -189,7 +189,10 @@ class OutlineMap:
     def restore(self, rows: Sequence[Sequence[float]]) -> str | None:
         """Put deleted segments back in the order of their arrival; return None, or why that is impossible.
 
-        `rows`: as of `edits.RestoreSegments`; finite. Those that are in the map are left as they are.
+        Parameters
+        ----------
+        rows : sequence of sequence of float
+            As of `edits.RestoreSegments`; finite. Those that are in the map are left as they are.
         """
         present = set(self.numbers[self.status > EMPTY].tolist())
         back = list({int(row[0]): row for row in rows if int(row[0]) not in present}.values())

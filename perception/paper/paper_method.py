@@ -59,7 +59,14 @@ CANDIDATE: Final = "candidate"
 class PaperPerception:
     """Echoes to objects, by the paper's method.
 
-    `ring`: the sensors. `models`: the objects to recognise. `config`: the settings of each step.
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    models : sequence of ModelConfig
+        The objects to recognise.
+    config : PerceptionConfig
+        The settings of each step.
     """
 
     SCRATCH: Final = ("_scratch",)

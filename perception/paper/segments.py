@@ -51,10 +51,21 @@ def tangent(
 
     A line n·x = c touches both circles where n·P1 + r1 = n·P2 + r2 = c, so that cos(α − φ) = (r1 − r2)/L for the
     direction α of n, with L and φ the length and direction of P2 − P1 (McKerrow 1993; paper §3.2, Figure 2).
-    `x1`, `y1`, `axis1`, `r1`: first reading: place of the sensor (m), direction of its axis (rad), range (m). `x2`,
-    `y2`, `axis2`, `r2`: second reading. `half_angle`: half the beam's width, rad: the arcs end there.
-    Returned: whether a tangent touches both arcs inside both beams, and the direction of its normal, from the sensors
-    to the surface (rad). If both roots do, the one nearer to the axes.
+
+    Parameters
+    ----------
+    x1, y1, axis1, r1 : float
+        First reading: place of the sensor (m), direction of its axis (rad), range (m).
+    x2, y2, axis2, r2 : float
+        Second reading.
+    half_angle : float
+        Half the beam's width, rad: the arcs end there.
+
+    Returns
+    -------
+    (bool, float)
+        Whether a tangent touches both arcs inside both beams, and the direction of its normal, from the sensors
+        to the surface (rad). If both roots do, the one nearer to the axes.
     """
     baseline = math.hypot(x2 - x1, y2 - y1)
     if baseline == 0.0 or abs(r1 - r2) > baseline:
@@ -158,7 +169,12 @@ def pair_readings(
 class SegmentExtractor:
     """Turns firings into outline segments; keeps each sensor's last readings.
 
-    `ring`: mounts and beam width of the sensors. `config`: which readings are paired.
+    Parameters
+    ----------
+    ring : RingConfig
+        Mounts and beam width of the sensors.
+    config : SegmentsConfig
+        Which readings are paired.
     """
 
     SCRATCH: Final = ("_out", "_sensor_records")

@@ -70,8 +70,15 @@ def count_short_readings(c: SensorMemory, r: float, fired_set: int) -> None:
     """Compare the last reading with `r` and with the one before it, if those were fired in other sets.
 
     Borenstein & Koren 1995 (EERUF): a true echo does not depend on which other sensors fired.
-    `c`: the sensor. Its counts of short readings and its crosstalk flags are updated. `r`: the new reading, m.
-    `fired_set`: the set it was fired in.
+
+    Parameters
+    ----------
+    c : SensorMemory
+        The sensor. Its counts of short readings and its crosstalk flags are updated.
+    r : float
+        The new reading, m.
+    fired_set : int
+        The set it was fired in.
     """
     middle = c.last_set
     if c.readings < 2 or middle in (fired_set, c.before_last_set):

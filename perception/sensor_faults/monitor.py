@@ -60,9 +60,17 @@ TOLERANCE_STEPS: Final = 1.1
 def neighbours_of(axes: Floats, turning: tuple[int, ...] = ()) -> Ints:
     """Return the sensors that look next to each one on the left and on the right.
 
-    `axes`, shape (n,): direction of each sensor in the ring, rad. `turning`: the sensors that turn with the wheels:
-    none of them is the neighbour of one that does not.
-    Returned, shape (n, 2): indices of the neighbours, −1 twice for a sensor that has not two.
+    Parameters
+    ----------
+    axes : (n,) float
+        Direction of each sensor in the ring, rad.
+    turning : tuple of int
+        The sensors that turn with the wheels: none of them is the neighbour of one that does not.
+
+    Returns
+    -------
+    (n, 2) int
+        Indices of the neighbours, −1 twice for a sensor that has not two.
     """
     neighbours: Ints = np.full((len(axes), 2), -1, np.int64)
     turns = np.isin(np.arange(len(axes)), turning)
@@ -103,7 +111,10 @@ def are_sound(sensors: Records[SensorMemory]) -> bool:
 class SensorMonitor:
     """Removes untrustworthy readings from firings.
 
-    `ring`: the sensors, and which of them should fire.
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors, and which of them should fire.
     """
 
     SCRATCH: Final = ("_trusted", "_possible", "_turns", "_setup", "_sensor_records", "_ring_records")

@@ -89,8 +89,15 @@ def count_changes(c: SensorMemory, r: float, tolerance: float) -> None:
 
     Single stray readings come along every wall, by drop-outs, the echoes of others and noise: they say nothing of
     whether the surface comes nearer.
-    `c`: what is remembered of the sensor. Its counts are updated. `r`: its new reading, m. `tolerance`: readings that
-    differ by no more than this are equal, m.
+
+    Parameters
+    ----------
+    c : record
+        What is remembered of the sensor. Its counts are updated.
+    r : float
+        Its new reading, m.
+    tolerance : float
+        Readings that differ by no more than this are equal, m.
     """
     first = c.readings == 0
     has_changed = not first and is_off(r, c.steady_m, tolerance) and is_off(c.last_m, c.steady_m, tolerance)
@@ -249,8 +256,11 @@ def follow_run(
     """Count a reading to the run of equal readings of sensor `i`, or begin another run.
 
     A run also begins anew where a healthy sensor goes on reading the same: once it has turned, and along a wall.
-    `i`, `r`, `pose`, `setup`, `sensors`, `ring`: as for `check_firing`; `r` is the reading of sensor `i`. Its run is
-    updated.
+
+    Parameters
+    ----------
+    i, r, pose, setup, sensors, ring
+        As for `check_firing`; `r` is the reading of sensor `i`. Its run is updated.
     """
     x, y, yaw = pose
     own_yaw = yaw + setup.turns[i]

@@ -26,8 +26,12 @@ IN_PLACE_M: Final = 0.1
 def follow_turn(x: float, y: float, yaw: float, ring: Records[RingMemory]) -> None:
     """Follow how far the ring has turned in place; after two full turns begin anew, for readings that began later.
 
-    `x`, `y`, `yaw`: pose of the ring, m and rad. `ring`, shape (1,): what is remembered of the ring, with this firing
-    counted. Updated.
+    Parameters
+    ----------
+    x, y, yaw : float
+        Pose of the ring, m and rad.
+    ring : (1,) record
+        What is remembered of the ring, with this firing counted. Updated.
     """
     c = ring[0]
     is_elsewhere = math.hypot(x - c.turn_x, y - c.turn_y) > IN_PLACE_M
@@ -42,7 +46,14 @@ def follow_turn(x: float, y: float, yaw: float, ring: Records[RingMemory]) -> No
 def repeats_through_turn(i: int, r: float, sensors: Records[SensorMemory], ring: Records[RingMemory]) -> bool:
     """Return whether sensor `i` has read the same through a full turn in place, and most others read otherwise.
 
-    `i`: the sensor. `r`: its echo's range, m. `sensors`, `ring`: what is remembered of each sensor, and of the ring.
+    Parameters
+    ----------
+    i : int
+        The sensor.
+    r : float
+        Its echo's range, m.
+    sensors, ring
+        What is remembered of each sensor, and of the ring.
     """
     if abs(ring[0].turned) < math.tau or sensors[i].run_firing > ring[0].turn_firing:
         return False

@@ -23,8 +23,12 @@ SQUARE_MIN: Final = 0.94
 def towards_wall(axis: float, half_angle: float) -> float:
     """Return the angle from the path, in a beam about `axis`, that is nearest to the normal of a wall along it, rad.
 
-    `axis`: angle of the beam's axis from the path, rad: towards the wall it is between 0 and π. `half_angle`: half
-    the beam's width, rad.
+    Parameters
+    ----------
+    axis : float
+        Angle of the beam's axis from the path, rad: towards the wall it is between 0 and π.
+    half_angle : float
+        Half the beam's width, rad.
     """
     return min(max(0.5 * math.pi, axis - half_angle), axis + half_angle)
 

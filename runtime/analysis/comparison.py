@@ -58,7 +58,11 @@ def compare_runs(
     """Replay a recording with its own settings and with others, cycle by cycle, and return both outcomes.
 
     `on_message` is called after each message, for a progress bar.
-    Raises `RecordingError`: the other settings are for another ring.
+
+    Raises
+    ------
+    RecordingError
+        The other settings are for another ring.
     """
     own, others = len(recording.settings.ring.mounts), len(settings.ring.mounts)
     if others != own:

@@ -53,7 +53,11 @@ def predicted_nat(settings: Settings, perceived: PerceivedRows, withheld: Sequen
 
     `perceived` is what perception of these settings found in the other firings. The unit is nat; 0 is what a map
     without any knowledge gets.
-    Raises `UserError`: no sensor fired in the withheld firings.
+
+    Raises
+    ------
+    UserError
+        No sensor fired in the withheld firings.
     """
     beams, measured = _readings(settings, withheld)
     if not len(measured):

@@ -79,7 +79,11 @@ def load_timeline(
     each message or firing, for a progress bar. `skim`: what perception knew is taken from the keyframes of a long
     recording, and only what follows the last one is replayed; what lies between them is read, but neither perceived
     nor compared again.
-    Raises `UserError`: the file cannot be read, or holds nothing to show.
+
+    Raises
+    ------
+    UserError
+        The file cannot be read, or holds nothing to show.
     """
     path = Path(source.file)
     if not is_recording(path):

@@ -89,7 +89,11 @@ class DaskPool:
         """Wait for the next run that ends, and return it with its row, or with the error that it raised.
 
         That error is returned, not raised. There must be a run under way.
-        Raises `UserError`: the scheduler is gone, or a worker has another version of this program.
+
+        Raises
+        ------
+        UserError
+            The scheduler is gone, or a worker has another version of this program.
         """
         future = next(self._completed)
         run, attempt = self._under_way.pop(future.key)

@@ -53,7 +53,10 @@ class RowFolder:
     def write(self, row: Row) -> None:
         """Write the row of a finished run.
 
-        Raises `OSError`: it cannot be written.
+        Raises
+        ------
+        OSError
+            It cannot be written.
         """
         self._rows.mkdir(exist_ok=True)
         with whole_file(self._rows / f"{row['key']}.json") as part:
@@ -98,7 +101,10 @@ def like_each_other(values: Sequence[Value]) -> list[Value]:
 def write_table(study: StudyConfig, columns: Mapping[str, list[Any]], folder: Path) -> Path:
     """Write the table as Parquet, with the study in its metadata, and return the file.
 
-    Raises `OSError`: it cannot be written.
+    Raises
+    ------
+    OSError
+        It cannot be written.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq

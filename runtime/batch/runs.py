@@ -53,9 +53,19 @@ class Run:
 def expand(study: StudyConfig, base: Path, varied: Sequence[Mapping[str, Value]] | None = None) -> list[Run]:
     """Return the runs of a study, each once, settings after settings.
 
-    `base`: its folder, to which paths in it are relative. `varied`: values of settings by name; by default every
-    combination of the study.
-    Raises `ConfigError`: a scene, a file or a value is invalid, or there are too many runs or none.
+    Parameters
+    ----------
+    study : StudyConfig
+        The study.
+    base : Path
+        Its folder, to which paths in it are relative.
+    varied : sequence of mapping, optional
+        Values of settings by name; by default every combination of the study.
+
+    Raises
+    ------
+    ConfigError
+        A scene, a file or a value is invalid, or there are too many runs or none.
     """
     subjects = list(_subjects(study, base))
     varied = combinations(study) if varied is None else varied
@@ -84,7 +94,10 @@ def expand(study: StudyConfig, base: Path, varied: Sequence[Mapping[str, Value]]
 def _settings(study: StudyConfig, base: Path, overrides: tuple[str, ...], world: str | None) -> Settings:
     """Return the settings of a run; a drive ends with its leg, as in the experiment.
 
-    Raises `UserError`: they are invalid, the leg has no end, or the robot would not see where it drives.
+    Raises
+    ------
+    UserError
+        They are invalid, the leg has no end, or the robot would not see where it drives.
     """
     settings = load_settings(
         _path(study.config, base),
@@ -113,7 +126,10 @@ def combinations(study: StudyConfig) -> list[dict[str, Value]]:
 def _subjects(study: StudyConfig, base: Path) -> Iterator[tuple[RunKind, str, str]]:
     """Yield kind, name and identity of all that is run with each setting.
 
-    Raises `ConfigError`: there is no such scene, or no recording.
+    Raises
+    ------
+    ConfigError
+        There is no such scene, or no recording.
     """
     known = get_args(SceneName)
     for scene in study.scenes:
@@ -138,7 +154,10 @@ def _subjects(study: StudyConfig, base: Path) -> Iterator[tuple[RunKind, str, st
 def _truths(study: StudyConfig, base: Path, subjects: Iterable[str]) -> dict[str, str | None]:
     """Return the true world (JSON) of each recording; None where the study names none.
 
-    Raises `ConfigError`: one cannot be read or is invalid.
+    Raises
+    ------
+    ConfigError
+        One cannot be read or is invalid.
     """
     if study.truth is None or study.recordings is None:
         return dict.fromkeys(subjects)
@@ -152,7 +171,10 @@ def _truths(study: StudyConfig, base: Path, subjects: Iterable[str]) -> dict[str
 def _identity(path: Path, folder: Path) -> str:
     """Return what makes a recording another one: its path in the folder, its size, a digest of its ends.
 
-    Raises `ConfigError`: it cannot be read.
+    Raises
+    ------
+    ConfigError
+        It cannot be read.
     """
     try:
         size = path.stat().st_size

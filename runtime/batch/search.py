@@ -39,7 +39,11 @@ class OptunaSearch:
     """Optuna's tree-structured Parzen estimator (Bergstra et al. 2011), with all settings in one density.
 
     The present values are tried first if they are among those allowed.
-    Raises `UserError`: a setting whose value is whole has a range without a whole number.
+
+    Raises
+    ------
+    UserError
+        A setting whose value is whole has a range without a whole number.
     """
 
     def __init__(self, varied: Sequence[VaryConfig], present: Mapping[str, Value], seed: int) -> None:
@@ -84,7 +88,10 @@ class OptunaSearch:
 def _whole_ends(one: VaryConfig) -> tuple[int, int]:
     """Return the least and the greatest whole number in a setting's range.
 
-    Raises `UserError`: there is none.
+    Raises
+    ------
+    UserError
+        There is none.
     """
     low, high = math.ceil(one.range[0]), math.floor(one.range[1])
     if low > high:

@@ -111,7 +111,10 @@ class Tuner:
     def search(self, search: Search, trials: int) -> Tuned:
         """Search with so many trials, and return what was found.
 
-        Raises `UserError`: the present settings give no figure to compare with.
+        Raises
+        ------
+        UserError
+            The present settings give no figure to compare with.
         """
         (present,) = self._run_trials([{}])
         if present.figures is None:

@@ -30,8 +30,16 @@ def study_to_tune(name: str) -> tuple[StudyConfig, Path]:
 
     Settings to search among and objectives that the study leaves out are added: `THRESHOLDS` where the truth is
     known, `SENSORS` where there are recordings.
-    `name`: a shipped study, a study file, or a folder of recordings.
-    Raises `UserError`: it is invalid, or cannot be tuned.
+
+    Parameters
+    ----------
+    name : str
+        A shipped study, a study file, or a folder of recordings.
+
+    Raises
+    ------
+    UserError
+        It is invalid, or cannot be tuned.
     """
     if Path(name).is_dir():
         study, base = StudyConfig(recordings="."), Path(name)

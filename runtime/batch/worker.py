@@ -39,7 +39,11 @@ def run_one(run: Run) -> Row:
     """Make a run and return its row.
 
     A drive that did not arrive is a result as well: its status is ``failed``.
-    Raises `UserError`: a recording cannot be read here.
+
+    Raises
+    ------
+    UserError
+        A recording cannot be read here.
     """
     settings = prepared_settings(run.settings)
     started_s = time.perf_counter()
@@ -69,7 +73,10 @@ def prepared_settings(text: str) -> Settings:
 def drive_figures(settings: Settings, seed: int) -> Row:
     """Return the figures of a drive through the settings' world.
 
-    Raises `UserError`: the robot did not arrive, or there is no world.
+    Raises
+    ------
+    UserError
+        The robot did not arrive, or there is no world.
     """
     from runtime.simulation.evaluation import run_seed
 
@@ -102,9 +109,17 @@ def scene_figures(settings: Settings, scene: str, seed: int) -> Row:
 def recording_figures(settings: Settings, run: Run) -> Row:
     """Return the figures of a replay; without a true world only those that need none.
 
-    `settings`: of a ring log; a recording (MCAP) contains its own. `run`: the file, what differs from the settings in
-    it, and the true world.
-    Raises `UserError`: the file cannot be read.
+    Parameters
+    ----------
+    settings : Settings
+        Of a ring log; a recording (MCAP) contains its own.
+    run : Run
+        The file, what differs from the settings in it, and the true world.
+
+    Raises
+    ------
+    UserError
+        The file cannot be read.
     """
     from runtime.analysis.comparison import run_under
     from runtime.analysis.export.ring_log_export import recorded_firings

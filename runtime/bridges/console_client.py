@@ -93,7 +93,10 @@ class ConsoleClient:
     async def messages(self) -> AsyncIterator[Message]:
         """Yield every message but answers and challenges, in order, until the connection ends.
 
-        Raises `ConsoleError`: the connection ended; it says how.
+        Raises
+        ------
+        ConsoleError
+            The connection ended; it says how.
         """
         while True:
             while self._kept:
@@ -107,7 +110,11 @@ class ConsoleClient:
         """Send a command with the newest challenge, wait for its answer and return the answer's data.
 
         docs/console-protocol.md lists commands, as `halt`, with their arguments.
-        Raises `ConsoleError`: the run refuses it, or no answer came.
+
+        Raises
+        ------
+        ConsoleError
+            The run refuses it, or no answer came.
         """
         if self._end is not None:
             raise self._end
@@ -219,7 +226,11 @@ async def connect(url: str) -> AsyncIterator[ConsoleClient]:
     """Connect to a run and yield the client; disconnect at the end.
 
     The URL is the start URL that the run printed, with its token.
-    Raises `ConsoleError`: the URL is wrong, no run answers there, or it refuses the client.
+
+    Raises
+    ------
+    ConsoleError
+        The URL is wrong, no run answers there, or it refuses the client.
     """
     address = _address(url)
     timeout = aiohttp.ClientTimeout(total=None, sock_connect=CONNECT_MAX_S, sock_read=None)
@@ -272,7 +283,10 @@ async def stay_connected(
 def _address(url: str) -> URL:
     """Return a start URL.
 
-    Raises `ConsoleError`: it is none.
+    Raises
+    ------
+    ConsoleError
+        It is none.
     """
     try:
         address = URL(url)

@@ -29,7 +29,11 @@ async def serve_fleet(fleet: Fleet, host: str, port: int, urls: Sequence[str], t
 
     Port 0 takes any that is free. `urls` are start URLs of runs on other machines; `tell` gets the page's own in a
     line.
-    Raises `UserError`: a URL is wrong, or it cannot listen there.
+
+    Raises
+    ------
+    UserError
+        A URL is wrong, or it cannot listen there.
     """
     for url in urls:
         if (problem := fleet.add(url)) is not None:

@@ -31,7 +31,11 @@ async def serve_foxglove(
 
     `find` returns the start URL of the run; `report` gets one line for the address and for each problem. `allow_set`:
     Foxglove may change settings.
-    Raises `UserError`: the port is in use.
+
+    Raises
+    ------
+    UserError
+        The port is in use.
     """
     bridge = _Bridge(asyncio.get_running_loop(), report, allow_set=allow_set)
     context = foxglove.Context()
@@ -127,7 +131,10 @@ class _Bridge(ServerListener):
     async def _request(self, known: Message, value: Any) -> None:  # noqa: ANN401 - a setting's value
         """Change a setting of the run, with control for as long as that takes.
 
-        Raises `UserError`: there is no run, or it refuses.
+        Raises
+        ------
+        UserError
+            There is no run, or it refuses.
         """
         client = self._client
         if client is None:

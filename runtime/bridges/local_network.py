@@ -132,7 +132,11 @@ async def find_robots(seconds: float, interfaces: Sequence[str] | None = None) -
     """Return the runs that answer on the local network, by name.
 
     They are asked for on interfaces with these addresses, by default on all.
-    Raises `OSError`: there is no network to ask on.
+
+    Raises
+    ------
+    OSError
+        There is no network to ask on.
     """
     from zeroconf import InterfaceChoice, IPVersion
     from zeroconf.asyncio import AsyncZeroconf
@@ -167,7 +171,11 @@ async def serve(host: str, port: int, lines: asyncio.StreamReader) -> None:
 
     The run is announced, and others are looked for, only on the host's address. Each line is a JSON object with the
     run's name and mode.
-    Raises `OSError`: there is no network to announce on.
+
+    Raises
+    ------
+    OSError
+        There is no network to announce on.
     """
     from zeroconf import IPVersion
     from zeroconf.asyncio import AsyncZeroconf

@@ -45,7 +45,10 @@ ModelFiles = Annotated[
 def parse_whole_number(_type: type, tokens: Sequence[Token]) -> int:
     """Return a whole number ≥ 0; without this converter, cyclopts takes 1.5 for 1.
 
-    Raises `ValueError`: the text is not a whole number.
+    Raises
+    ------
+    ValueError
+        The text is not a whole number.
     """
     text = tokens[0].value
     if not (text.isascii() and text.isdigit()):
@@ -56,7 +59,10 @@ def parse_whole_number(_type: type, tokens: Sequence[Token]) -> int:
 def parse_port(_type: type, tokens: Sequence[Token]) -> int:
     """Return a TCP port, 0 for any that is free.
 
-    Raises `ValueError`: there is no such port.
+    Raises
+    ------
+    ValueError
+        There is no such port.
     """
     port = parse_whole_number(_type, tokens)
     if port >= 1 << 16:

@@ -41,7 +41,10 @@ def ending_in_order() -> Iterator[None]:
 def ending_the_start() -> Iterator[None]:
     """Cancel the current task, once, when one of these signals comes; a UserError then names the signal.
 
-    Raises `UserError`: a signal came; its exit code is 128 + n.
+    Raises
+    ------
+    UserError
+        A signal came; its exit code is 128 + n.
     """
     import asyncio  # takes long, and not every command needs it
 

@@ -163,8 +163,14 @@ def pose_line(pose: PoseRow, units: Units) -> str:
 def budget_table(rows: Sequence[BudgetRow], unit: str, units: Units) -> Table:
     """Return when the answers came under each budget, and what they were in the end.
 
-    `rows`: the results, one budget each; lengths in metres. `unit`: unit of the budgets for the heading, e.g. ms.
-    `units`: units of the printed lengths.
+    Parameters
+    ----------
+    rows : sequence of BudgetRow
+        The results, one budget each; lengths in metres.
+    unit : str
+        Unit of the budgets for the heading, e.g. ms.
+    units : {"m", "ft"}
+        Units of the printed lengths.
     """
     title = "a hall of 40 drums: when the answers come, and what they are in the end"
     caption = "first: until a drum was reported; way: the robot's until each was; mean, max: error"
@@ -190,7 +196,12 @@ def budget_table(rows: Sequence[BudgetRow], unit: str, units: Units) -> Table:
 def drift_table(rows: Sequence[DriftRow], units: Units) -> Table:
     """Return what rounds with drifting odometry gave, with and without correction.
 
-    `rows`: the results, one level of errors each; lengths in metres. `units`: units of the printed lengths.
+    Parameters
+    ----------
+    rows : sequence of DriftRow
+        The results, one level of errors each; lengths in metres.
+    units : {"m", "ft"}
+        Units of the printed lengths.
     """
     title = "three rounds among eight drums: errors at the end, with and without correction of the drift"
     caption = "error: of the drums, as seen from the robot; place, heading: of the robot; NEES: expected 3 and 2"

@@ -83,7 +83,10 @@ class Connection(NamedTuple):
     def refuse_missing(self) -> None:
         """Raise what `connect` would raise if there is no such port; nothing is opened.
 
-        Raises `LinkError`: there is none.
+        Raises
+        ------
+        LinkError
+            There is none.
         """
         config = self.link.config
         if self.link.opener is open_port and is_missing(config):

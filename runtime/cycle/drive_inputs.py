@@ -21,7 +21,12 @@ class DriveInputs:
     def put(self, asked: DriveInput, is_valid: Callable[[], bool]) -> bool:
         """Add a request; return False, and add none, where too many wait. One that replaces the drive replaces them.
 
-        `asked`: the request. `is_valid`: returns False once the request must not be carried out any more.
+        Parameters
+        ----------
+        asked : DriveInput
+            The request.
+        is_valid : callable
+            Returns False once the request must not be carried out any more.
         """
         if not isinstance(asked, MissionEdit):
             self._waiting.clear()

@@ -118,8 +118,14 @@ def drive(state: DriveState, percept: Percept, settings: Settings, now: Moment) 
 def commit(after: DriveState, twist: Twist, requested_run_s: float, run_s: float) -> tuple[Twist, str | None]:
     """Return the velocity to command, without speed where a start waits, and why it waits.
 
-    `after`: for the next cycle. Updated by what the velocity commits to. `twist`: the velocity after all limits.
-    `requested_run_s`, `run_s`: when the request was made, and now, by the run's clock, s.
+    Parameters
+    ----------
+    after : DriveState
+        For the next cycle. Updated by what the velocity commits to.
+    twist : Twist
+        The velocity after all limits.
+    requested_run_s, run_s : float
+        When the request was made, and now, by the run's clock, s.
     """
     request, requested, before = after.drive_request, 0, after.drive_memory.commitment
     if isinstance(request, Teleoperate):  # each message is a request: only another direction is a new one
@@ -328,7 +334,14 @@ def _on_mission(
 def of_step(step: StepConfig, settings: Settings, before: StepSettings | None) -> StepSettings:
     """Return the settings of a step: those of the cycle before, unless the step or the run's settings are others.
 
-    `step`: the step that is driven. `settings`: the run's. `before`: of the cycle before.
+    Parameters
+    ----------
+    step : StepConfig
+        The step that is driven.
+    settings : Settings
+        The run's.
+    before : StepSettings or None
+        Of the cycle before.
     """
     if before is not None and before.step is step and before.run is settings:
         return before

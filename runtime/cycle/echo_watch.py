@@ -72,8 +72,12 @@ class EchoWatch:
     def observe(self, odometry: Odometry | None, firings: Sequence[Firing], *, hears_new: bool = True) -> EchoWatch:
         """Return the watch after a cycle.
 
-        `odometry`, `firings`: what arrived in it. `hears_new`: whether an echo among them may be new: a frozen ring
-        repeats old ones.
+        Parameters
+        ----------
+        odometry, firings
+            What arrived in it.
+        hears_new
+            Whether an echo among them may be new: a frozen ring repeats old ones.
         """
         hears = any(math.isfinite(r) for firing in firings for r in firing.ranges_m.tolist())
         if hears and hears_new:

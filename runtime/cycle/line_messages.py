@@ -61,8 +61,14 @@ ROBOT_LINE: Final = RobotLine()
 class ProgramLine:
     """Words messages about a line to a program.
 
-    `program`: what it is, as a user knows it. `action`: what to do if it has ended. `has_ended`: returns whether it
-    is known to have ended.
+    Parameters
+    ----------
+    program : str
+        What it is, as a user knows it.
+    action : str
+        What to do if it has ended.
+    has_ended : callable
+        Returns whether it is known to have ended.
     """
 
     program: str
@@ -117,8 +123,14 @@ def blind_reason(blind_s: float, line_problem: str | None, *, fires: bool) -> st
 def unseen_reason(unseen: Unseen, fired_s: float, ring: RingConfig) -> str:
     """Return why the robot stands that does not see its way; one that has just started needs time, and no check.
 
-    `unseen`: the arbiter's decision. `fired_s`: time since the ring's first firing on this line, s. `ring`: the
-    robot's.
+    Parameters
+    ----------
+    unseen
+        The arbiter's decision.
+    fired_s
+        Time since the ring's first firing on this line, s.
+    ring
+        The robot's.
     """
     is_new = unseen.sensors and math.isinf(unseen.age_s)
     if is_new and fired_s <= FIRST_LOOK_PATTERNS * firing_pattern(ring).cycle_s:

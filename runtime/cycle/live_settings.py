@@ -23,7 +23,10 @@ returns why that is impossible, None if the change can be applied."""
 class LiveSettings:
     """The settings in force, those before them, and who is notified of a change.
 
-    `settings`: what the run starts with.
+    Parameters
+    ----------
+    settings : Settings
+        What the run starts with.
     """
 
     def __init__(self, settings: Settings) -> None:

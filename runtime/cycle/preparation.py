@@ -109,8 +109,14 @@ class RunningPreparation:
     async def start(self, settings: Settings, connection: Connects, is_stopping: Callable[[], bool]) -> None:
         """Prepare what the first cycle needs and connect; go on to prepare recognition beside that and the cycles.
 
-        `settings`: of the run. `connection`: connects to the robot, before everything is prepared if that will fail.
-        `is_stopping`: whether the run is ending.
+        Parameters
+        ----------
+        settings : Settings
+            Of the run.
+        connection : Connects
+            Connects to the robot, before everything is prepared if that will fail.
+        is_stopping : callable
+            Whether the run is ending.
         """
         if self._preparation is not None:
             await self._prepare_ring(self._preparation, settings, connection, is_stopping)
@@ -131,7 +137,10 @@ class RunningPreparation:
     def progress(self, run_s: float) -> str | None:
         """Return how far it is in the cycle that begins at `run_s`; None once recognition is ready.
 
-        Raises `UserError`: the preparation failed.
+        Raises
+        ------
+        UserError
+            The preparation failed.
         """
         if self._preparation is None or self._task is None:
             return None

@@ -208,9 +208,17 @@ class RobotProcess:
     async def run(self, *, arm: bool, seconds: float | None) -> RunSummary:
         """Run until `stop` is called or `seconds` have passed, and return the summary.
 
-        `arm`: arm once, as soon as the robot is ready. `seconds`: counted from the first cycle with recognition, by
-        the run's clock.
-        Raises `UserError`: the port cannot be opened, or the robot does not answer as it should.
+        Parameters
+        ----------
+        arm : bool
+            Arm once, as soon as the robot is ready.
+        seconds : float, optional
+            Counted from the first cycle with recognition, by the run's clock.
+
+        Raises
+        ------
+        UserError
+            The port cannot be opened, or the robot does not answer as it should.
         """
         with self.health.catching_unhandled_errors():
             await self._preparation.start(self._settings, self._connection, self._stop.is_set)

@@ -358,7 +358,10 @@ def failed_start(reason: str) -> StartSummary:
 def write_json(path: str, summary: object) -> None:
     """Write a summary where ``--json`` says.
 
-    Raises `UserError`: the file cannot be written.
+    Raises
+    ------
+    UserError
+        The file cannot be written.
     """
     try:
         Path(path).write_bytes(orjson.dumps(summary, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE))

@@ -87,7 +87,10 @@ def encode(payload: Payload) -> bytes:
 def decode(kind: type[P], data: bytes) -> P:
     """Return the payload of type `kind` in `data`.
 
-    Raises `pydantic.ValidationError`: `data` is no JSON of this type, or one of its values is impossible.
+    Raises
+    ------
+    pydantic.ValidationError
+        `data` is no JSON of this type, or one of its values is impossible.
     """
     values = sum(data.count(begin) for begin in (b",", b"[", b"{"))
     if values > kind.VALUES_MAX or (len(data) > MESSAGE_MAX and kind is not Keyframe):

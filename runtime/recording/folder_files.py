@@ -54,7 +54,11 @@ def rename_recording(folder: Path, name: str, to: str) -> str:
     """Give a recording another name, and return that; it counts towards the folder's limits as before.
 
     `to` is the new name, with or without its suffix.
-    Raises `UserError`: there is no such recording, a run is writing it, or the new name is taken or is none.
+
+    Raises
+    ------
+    UserError
+        There is no such recording, a run is writing it, or the new name is taken or is none.
     """
     path = _finished(folder, name)
     stem = to.removesuffix(SUFFIX)
@@ -95,7 +99,10 @@ def rename_recording(folder: Path, name: str, to: str) -> str:
 def pin_recording(folder: Path, name: str, *, pinned: bool) -> bool:
     """Keep a recording when the folder is full, or no longer, also one being written; return whether it was kept.
 
-    Raises `UserError`: there is no such recording, or the disk refuses.
+    Raises
+    ------
+    UserError
+        There is no such recording, or the disk refuses.
     """
     path = _found(folder, name)
     was_pinned = is_pinned(path)
@@ -112,7 +119,10 @@ def pin_recording(folder: Path, name: str, *, pinned: bool) -> bool:
 def delete_recording(folder: Path, name: str) -> None:
     """Delete a recording for good.
 
-    Raises `UserError`: there is no such recording, a run is writing it, it is pinned, or the disk refuses.
+    Raises
+    ------
+    UserError
+        There is no such recording, a run is writing it, it is pinned, or the disk refuses.
     """
     path = _finished(folder, name)
     if is_pinned(path):
@@ -126,7 +136,10 @@ def delete_recording(folder: Path, name: str) -> None:
 def _found(folder: Path, name: str) -> Path:
     """Return the path of a recording in a folder.
 
-    Raises `UserError`: there is none of this name.
+    Raises
+    ------
+    UserError
+        There is none of this name.
     """
     path = find_recording(folder, name)
     if path is None:
@@ -137,7 +150,10 @@ def _found(folder: Path, name: str) -> Path:
 def _finished(folder: Path, name: str) -> Path:
     """Return the path of a recording that no run is writing.
 
-    Raises `UserError`: there is none of this name, or it is being written.
+    Raises
+    ------
+    UserError
+        There is none of this name, or it is being written.
     """
     path = _found(folder, name)
     if is_locked(path):

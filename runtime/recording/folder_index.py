@@ -50,7 +50,10 @@ def create_listed(path: Path) -> None:
 def listed_names(folder: Path) -> list[str]:
     """Return the names that the index of a folder lists, the oldest first; no such file need exist.
 
-    Raises `OSError`: there is an index, but it cannot be read.
+    Raises
+    ------
+    OSError
+        There is an index, but it cannot be read.
     """
     try:
         fd = os.open(folder / INDEX, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
@@ -89,7 +92,10 @@ def _is_ours(head: bytes) -> bool:
 def _append(index: Path, name: str) -> None:
     """Append a name to the index; a newline before it ends a line that a full disk cut off.
 
-    Raises `OSError`: it cannot be written.
+    Raises
+    ------
+    OSError
+        It cannot be written.
     """
     flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
     fd = os.open(index, flags, 0o666)

@@ -26,9 +26,19 @@ CHUNK_BYTES: Final = 256 * 1024
 class McapFile:
     """An open MCAP file. Every method raises OSError if the disk fails.
 
-    `path`: replaced if it exists. `info`: the first message, written in a chunk of its own with schemas and channels.
-    `log_ns`: its log time, Unix time in ns.
-    Raises `OSError`: the file cannot be created or written.
+    Parameters
+    ----------
+    path : Path
+        Replaced if it exists.
+    info : bytes
+        The first message, written in a chunk of its own with schemas and channels.
+    log_ns : int
+        Its log time, Unix time in ns.
+
+    Raises
+    ------
+    OSError
+        The file cannot be created or written.
     """
 
     def __init__(self, path: Path, info: bytes, log_ns: int) -> None:

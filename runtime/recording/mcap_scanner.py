@@ -97,7 +97,10 @@ def frame_bytes(data: memoryview, at: int) -> int:
 class McapScanner:
     """Reader of everything readable in a file's bytes.
 
-    `data`: the whole file; may be memory-mapped.
+    Parameters
+    ----------
+    data : memoryview
+        The whole file; may be memory-mapped.
     """
 
     def __init__(self, data: memoryview) -> None:

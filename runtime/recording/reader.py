@@ -77,14 +77,20 @@ class Recording:
     def cycle_records(self) -> Iterator[CycleRecord]:
         """Yield the record of every readable cycle in file order.
 
-        Raises `RecordingError`: a firing is of another ring.
+        Raises
+        ------
+        RecordingError
+            A firing is of another ring.
         """
         return (self.decode_cycle(message) for message in self.messages() if message.topic == CYCLE)
 
     def decode_cycle(self, message: RawMessage) -> CycleRecord:
         """Return the record in a cycle's message.
 
-        Raises `RecordingError`: a firing is of another ring: compiled code would read beyond its arrays.
+        Raises
+        ------
+        RecordingError
+            A firing is of another ring: compiled code would read beyond its arrays.
         """
         record = decode(Cycle, message.data).record
         sensors = self._sensors
@@ -136,7 +142,10 @@ def is_recording(path: Path) -> bool:
 def parse_settings(data: dict[str, Any]) -> Settings:
     """Return settings from their form in a recording.
 
-    Raises `pydantic.ValidationError`: they are not valid in this version.
+    Raises
+    ------
+    pydantic.ValidationError
+        They are not valid in this version.
     """
     return Settings.model_validate_json(orjson.dumps(data))
 
@@ -145,7 +154,10 @@ def parse_settings(data: dict[str, Any]) -> Settings:
 def map_file(path: Path) -> Iterator[memoryview]:
     """Memory-map a file and yield its bytes.
 
-    Raises `RecordingError`: the file does not exist, cannot be read, is empty, or is a pipe.
+    Raises
+    ------
+    RecordingError
+        The file does not exist, cannot be read, is empty, or is a pipe.
     """
     try:
         if path.is_fifo() or path.is_char_device():
@@ -169,8 +181,10 @@ def map_file(path: Path) -> Iterator[memoryview]:
 def check_origin(path: Path, scanner: McapScanner) -> None:
     """Refuse a file that another program wrote.
 
-    Raises `RecordingError`: neither profile nor library in its header is ours; one damaged byte therefore does not
-    refuse our own files.
+    Raises
+    ------
+    RecordingError
+        Neither profile nor library in its header is ours; one damaged byte therefore does not refuse our own files.
     """
     name = scanner.profile or scanner.library
     if name and not scanner.profile.startswith(PROFILE) and not scanner.library.startswith(PROFILE):
@@ -180,9 +194,19 @@ def check_origin(path: Path, scanner: McapScanner) -> None:
 def check_format(path: Path, scanner: McapScanner, info: RunInfo | None = None) -> None:
     """Refuse a recording of another format version.
 
-    `path`: the file, for the message. `scanner`: of the file. `info`: the file's first message. Its version counts
-    more than the header's, which no checksum protects.
-    Raises `RecordingError`: the version is known and is not ours.
+    Parameters
+    ----------
+    path : Path
+        The file, for the message.
+    scanner : McapScanner
+        Of the file.
+    info : RunInfo, optional
+        The file's first message. Its version counts more than the header's, which no checksum protects.
+
+    Raises
+    ------
+    RecordingError
+        The version is known and is not ours.
     """
     header = re.fullmatch(rf"{PROFILE}/(\d+)", scanner.profile)
     version = info.format if info is not None else FORMAT if header is None else int(header[1])
@@ -197,8 +221,11 @@ def check_format(path: Path, scanner: McapScanner, info: RunInfo | None = None) 
 def open_recording(path: Path) -> Iterator[Recording]:
     """Open a recording, damaged or not.
 
-    Raises `RecordingError`: the file is not a recording, has another format version, or nothing in it can be read.
-    Also raised if the body of the `with` statement decodes a message that is invalid in this version.
+    Raises
+    ------
+    RecordingError
+        The file is not a recording, has another format version, or nothing in it can be read. Also raised if the body
+        of the `with` statement decodes a message that is invalid in this version.
     """
     with map_file(path) as data:
         scanner = McapScanner(data)

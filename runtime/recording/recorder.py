@@ -70,8 +70,14 @@ def software_versions() -> dict[str, str]:
 def run_info(settings: Settings, host_clock: Callable[[], float], *, emulated: bool) -> RunInfo:
     """Return the first message of a recording that starts now.
 
-    `settings`: the run's. `host_clock`: the host's monotonic clock, s. Its difference to Unix time is fixed here, for
-    all log times. `emulated`: whether the settings' world is the true one.
+    Parameters
+    ----------
+    settings : Settings
+        The run's.
+    host_clock : callable
+        The host's monotonic clock, s. Its difference to Unix time is fixed here, for all log times.
+    emulated : bool
+        Whether the settings' world is the true one.
     """
     return RunInfo(
         format=FORMAT,
@@ -190,7 +196,10 @@ class Recorder:
     def undo_bookmark(self) -> str:
         """Withdraw the last bookmark that was not withdrawn; return its text.
 
-        Raises `UserError`: there is none, its file is finished, or the disk is too slow.
+        Raises
+        ------
+        UserError
+            There is none, its file is finished, or the disk is too slow.
         """
         if not self._bookmarks:
             raise UserError("there is no bookmark of this run to withdraw")

@@ -219,7 +219,10 @@ class Replayer:
     def _after_keyframe(self, start: KeyframePosition) -> Iterator[RawMessage]:
         """Take over the state of a keyframe, and return the messages after it.
 
-        Raises `KeyframeError`: it is not there, or its state is refused.
+        Raises
+        ------
+        KeyframeError
+            It is not there, or its state is refused.
         """
         messages = self._since(start.chunk_offset)
         for message in messages:
@@ -233,7 +236,10 @@ class Replayer:
     def _apply_settings(self, data: dict[str, Any]) -> None:
         """Put other settings in force, as the run did at this point.
 
-        Raises `RecordingError`: they are not those that a run may change.
+        Raises
+        ------
+        RecordingError
+            They are not those that a run may change.
         """
         if data == self.settings_data:
             return
@@ -253,7 +259,10 @@ class Replayer:
     def _cycle(self, message: RawMessage) -> ReplayStep:
         """Run a cycle on the recorded inputs. In a gap, or where it is only skimmed, the state is not known then.
 
-        Raises `RecordingError`: the cycle cannot be computed.
+        Raises
+        ------
+        RecordingError
+            The cycle cannot be computed.
         """
         record = self._recording.decode_cycle(message)
         if record.cycle in self._skimmed:
@@ -271,7 +280,10 @@ class Replayer:
     def _refusing(self, cycle: int) -> Iterator[None]:
         """Refuse the recording where a cycle's computation fails.
 
-        Raises `RecordingError`: it fails.
+        Raises
+        ------
+        RecordingError
+            It fails.
         """
         try:
             yield

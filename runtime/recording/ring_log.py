@@ -81,7 +81,10 @@ def read_ring_log(
 def _lines(file: BinaryIO, path: Path) -> Iterator[str]:
     """Yield the file's lines as text; decoded one by one, so that an error can name the row.
 
-    Raises `RingLogError`: a line is too long, or no text in UTF-8.
+    Raises
+    ------
+    RingLogError
+        A line is too long, or no text in UTF-8.
     """
     for row, raw in enumerate(iter(lambda: file.readline(LINE_MAX_BYTES), b""), start=1):
         if len(raw) == LINE_MAX_BYTES:
@@ -104,7 +107,11 @@ def _rows(file: BinaryIO, path: Path) -> Iterator[tuple[int, list[str]]]:
 
     Each line is parsed by itself. A quoted cell may span lines in CSV but not here: a missing quote would otherwise
     read the whole rest of the file into memory as a single row.
-    Raises `RingLogError`: a row is not CSV.
+
+    Raises
+    ------
+    RingLogError
+        A row is not CSV.
     """
     for row, line in enumerate(_lines(file, path), start=1):
         try:
@@ -125,7 +132,10 @@ def _firings(
 ) -> Iterator[Firing]:
     """Yield the firing of each row after the header, as it is read; `servos` turns bearings into mounts.
 
-    Raises `RingLogError`: the header or a row is invalid; firings before it have been yielded by then.
+    Raises
+    ------
+    RingLogError
+        The header or a row is invalid; firings before it have been yielded by then.
     """
     header_row, header = next(rows, (1, None))
     if header is None:
@@ -185,7 +195,10 @@ def _check_header(
 ) -> tuple[int, int, list[tuple[int, int]]]:
     """Return the columns at which ranges begin and end, and the pair of sensors of each column of half paths.
 
-    Raises `RingLogError`: it is none of this ring; the text says what is wrong.
+    Raises
+    ------
+    RingLogError
+        It is none of this ring; the text says what is wrong.
     """
     _check_names(names, path, row)
     lead = [*REQUIRED, RING_YAW] if RING_YAW in names else [*REQUIRED]
@@ -227,7 +240,10 @@ def _check_names(names: Sequence[str], path: Path, row: int) -> None:
 def _pair_of(name: str, count: int, path: Path, row: int) -> tuple[int, int]:
     """Return the sensors, one of `count` that pings and one that listens, of a column of half paths.
 
-    Raises `RingLogError`: it is the name of no such column.
+    Raises
+    ------
+    RingLogError
+        It is the name of no such column.
     """
     found = _CROSS.fullmatch(name)
     transmitter, listener = (int(found[1]), int(found[2])) if found else (0, 0)
@@ -245,7 +261,10 @@ def cross_column(transmitter: int, listener: int) -> str:
 def _number(cell: str) -> float:
     """Return the number in a cell; `float` alone would also accept 1_000 and digits of other scripts.
 
-    Raises `ValueError`: it holds none.
+    Raises
+    ------
+    ValueError
+        It holds none.
     """
     if "_" in cell or not cell.isascii():
         raise ValueError(cell)
@@ -255,7 +274,10 @@ def _number(cell: str) -> float:
 def _finite(cell: str) -> float:
     """Return the finite number in a cell.
 
-    Raises `ValueError`: it is none.
+    Raises
+    ------
+    ValueError
+        It is none.
     """
     value = _number(cell)
     if not math.isfinite(value):
@@ -266,7 +288,10 @@ def _finite(cell: str) -> float:
 def _range(cell: str) -> float:
     """Return the range in a cell, m: NaN if it is empty, inf for the text inf.
 
-    Raises `ValueError`: it is negative, or no number.
+    Raises
+    ------
+    ValueError
+        It is negative, or no number.
     """
     if not cell:
         return math.nan
@@ -280,7 +305,10 @@ def _range(cell: str) -> float:
 def _any_range(cell: str) -> float:
     """Return a range in any convention: negative ones as they are, and −inf for the text nan.
 
-    Raises `ValueError`: it is infinite without being written so.
+    Raises
+    ------
+    ValueError
+        It is infinite without being written so.
     """
     value = _number(cell) if cell else math.nan
     if value == -math.inf or (value == math.inf and _SPELT_INF.fullmatch(cell) is None):

@@ -127,7 +127,11 @@ def replay_in_known_room(
     The objects are in the map frame if the robot's place is known at the end, otherwise in odometry's.
 
     `on_pose` gets the time (s) of each firing and the robot's pose as known then.
-    Raises `ValueError`: the settings name no known room.
+
+    Raises
+    ------
+    ValueError
+        The settings name no known room.
     """
     replayer = FiringReplayer(settings, firings)
     known_room = replayer.perception.known_room

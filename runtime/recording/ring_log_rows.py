@@ -146,7 +146,10 @@ class RingLogRows:
     def check_not_empty(self) -> None:
         """Refuse a ring log without a firing.
 
-        Raises `RingLogError`: no row was written.
+        Raises
+        ------
+        RingLogError
+            No row was written.
         """
         if self.count == 0:
             raise RingLogError(f"{self._path}: there is no firing to write; a ring log holds at least one")

@@ -25,8 +25,14 @@ QUEUE_MAX: Final = 4096
 class RingLogWriter:
     """Writer of a ring log. As a context manager it starts and stops the writing.
 
-    `path`: replaced if it exists. `pairs`: the cross paths of the firing pattern, (transmitter, listener): those of a
-    later one have no column. `servos`: the bearings of the ring.
+    Parameters
+    ----------
+    path : Path
+        Replaced if it exists.
+    pairs : sequence of tuple
+        The cross paths of the firing pattern, (transmitter, listener): those of a later one have no column.
+    servos : ServoColumns, optional
+        The bearings of the ring.
     """
 
     def __init__(self, path: Path, pairs: Sequence[tuple[int, int]] = (), servos: ServoColumns | None = None) -> None:
@@ -89,7 +95,10 @@ class RingLogWriter:
     def _write(self, firing: Firing) -> None:
         """Write a firing.
 
-        Raises `OSError`: it is lost: the background writer counts it.
+        Raises
+        ------
+        OSError
+            It is lost: the background writer counts it.
         """
         if self._file is None or self._rows is None:
             raise OSError(self.last_error)  # counted as lost

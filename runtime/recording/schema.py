@@ -117,7 +117,10 @@ class SerialBytes(TimedPayload):
     def _check(self) -> Self:
         """Check that pieces, times and data fit each other.
 
-        Raises `ValueError`: they do not.
+        Raises
+        ------
+        ValueError
+            They do not.
         """
         if len(self.after_us) != len(self.sizes):
             raise ValueError(f"{len(self.sizes)} pieces of data with {len(self.after_us)} times")
@@ -183,7 +186,10 @@ _REQUIRED: Final = frozenset(name for name, hint in _OBJECT.items() if get_origi
 def _checked_object(row: dict[str, Any]) -> dict[str, Any]:
     """Return a row with all fields of `ObjectRow`, finite; fields beyond those are numbers, flags or texts.
 
-    Raises `ValueError`: a field is missing or invalid.
+    Raises
+    ------
+    ValueError
+        A field is missing or invalid.
     """
     if missing := sorted(_REQUIRED - row.keys()):
         raise ValueError(f"an object without {missing[0]}")

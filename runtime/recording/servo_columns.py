@@ -27,7 +27,10 @@ HINT: Final = (
 class ServoColumns:
     """The columns of a ring's bearings.
 
-    `ring`: the ring; without servos rows pass as they are.
+    Parameters
+    ----------
+    ring : RingConfig
+        The ring; without servos rows pass as they are.
     """
 
     def __init__(self, ring: RingConfig) -> None:
@@ -45,10 +48,17 @@ class ServoColumns:
     def mounts(self, ranges: Floats, bearings: Sequence[float]) -> Floats:
         """Return the ranges of a row by mount.
 
-        `ranges`, shape (sensors,): NaN where a sensor did not fire. `bearings`: of `sensors`, rad; NaN where a cell
-        is empty.
-        Raises `ValueError`: a sensor that fired has no bearing, or one that its servo does not have; the text names
-        the column.
+        Parameters
+        ----------
+        ranges : (sensors,) float
+            NaN where a sensor did not fire.
+        bearings : sequence of float
+            Of `sensors`, rad; NaN where a cell is empty.
+
+        Raises
+        ------
+        ValueError
+            A sensor that fired has no bearing, or one that its servo does not have; the text names the column.
         """
         found = np.full(self._views.count, math.nan)
         turned = dict(zip(self.sensors, bearings, strict=True))
@@ -64,7 +74,10 @@ class ServoColumns:
     def row(self, ranges: Floats) -> tuple[list[float], list[float]]:
         """Return the ranges by sensor, and the bearings of `sensors`, of ranges by mount.
 
-        Raises `ValueError`: a sensor fired at two bearings at once.
+        Raises
+        ------
+        ValueError
+            A sensor fired at two bearings at once.
         """
         by_sensor = [math.nan] * self.sensor_count
         turned: dict[int, float] = {}

@@ -18,7 +18,11 @@ def check_snapshot(snapshot: Snapshot, fresh: Snapshot, bounds: Mapping[str, Bou
 
     `fresh` is the state in which a run with these settings starts, of the same names, dtypes and shapes; `bounds` are
     those of `perception.snapshot.bounds_of` for them.
-    Raises `ValueError`: a number is out of its bound, or has none.
+
+    Raises
+    ------
+    ValueError
+        A number is out of its bound, or has none.
     """
     for (name, values), (_, at_start) in zip(numbers_of(snapshot), numbers_of(fresh), strict=True):
         if is_scratch(name):

@@ -87,7 +87,10 @@ class SingleFile:
     def begin_part(self, part: int) -> Path:
         """Return the path of a file, numbered from 1: the first as the user named it, a later one is created.
 
-        Raises `OSError`: a later file cannot be created.
+        Raises
+        ------
+        OSError
+            A later file cannot be created.
         """
         if part == 1:
             return self.first
@@ -135,8 +138,15 @@ class RotatingFolder:
     oldest that fits goes. Pinned files, beside which an empty `NAME.mcap.keep` lies, stay and do not count. A file
     with a bookmark is pinned. Files that the folder's index does not list stay and do not count either. Nor do the
     files of another run go while it is writing one of them.
-    `folder`: created if it is missing. `run`: prefix of this run's file names; names sort by time. Another is taken
-    where files have it already. `config`: the limits.
+
+    Parameters
+    ----------
+    folder : Path
+        Created if it is missing.
+    run : str
+        Prefix of this run's file names; names sort by time. Another is taken where files have it already.
+    config : RecordingConfig
+        The limits.
     """
 
     folder: Path
@@ -159,7 +169,11 @@ class RotatingFolder:
         """Create a file, numbered from 1, and return its path; it counts as one of this run.
 
         Where another run has files of this name, `run` changes.
-        Raises `OSError`: it cannot be created.
+
+        Raises
+        ------
+        OSError
+            It cannot be created.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         run, number = self.run, 1
@@ -178,7 +192,10 @@ class RotatingFolder:
     def enforce_limits(self, current: Path) -> str | None:
         """Remove the file that the last check named if the folder exceeds a limit, but never `current`.
 
-        Returned: what goes next and how to keep it, once the folder comes within a tenth of a limit.
+        Returns
+        -------
+        str or None
+            What goes next and how to keep it, once the folder comes within a tenth of a limit.
         """
         files = self._counted_files()
         if self._fill(files) > 1.0 and self._announced is not None:
@@ -350,7 +367,9 @@ def find_recording(folder: Path, name: str) -> Path | None:
 def recordings_folder(config: RecordingConfig) -> Path:
     """Return the folder of the settings, or else `echolocate/runs` in the user's state folder.
 
-    Raises `UserError`: the settings name the home folder of a user that has none, or see
-    `runtime.support.user_folders`.
+    Raises
+    ------
+    UserError
+        The settings name the home folder of a user that has none, or see `runtime.support.user_folders`.
     """
     return expanded(config.folder, "recording.folder") if config.folder else state_folder() / "runs"

@@ -113,8 +113,14 @@ class RecorderStatus:
 class RecordingWriter:
     """A recording and the thread that writes it.
 
-    `info`: the first message of each file. `host_clock`: the host's clock of the run, s, for the log time of `info`.
-    `on`: whether to record from the start.
+    Parameters
+    ----------
+    info : RunInfo
+        The first message of each file.
+    host_clock : callable
+        The host's clock of the run, s, for the log time of `info`.
+    on : bool
+        Whether to record from the start.
     """
 
     def __init__(

@@ -91,7 +91,11 @@ def run_seed(
     """Run the experiment once in virtual time and return its outcome.
 
     `on_state` and `on_bytes` are called as by `simulate`, for a recorder.
-    Raises `UserError`: the robot stopped, touched an obstacle, or did not arrive within `SECONDS_MAX`.
+
+    Raises
+    ------
+    UserError
+        The robot stopped, touched an obstacle, or did not arrive within `SECONDS_MAX`.
     """
     run = simulate(
         settings, world, seed, SECONDS_MAX, on_state=on_state, options=SimulationOptions(on_bytes=on_bytes)
@@ -106,7 +110,10 @@ def run_seed(
 def stop_at_leg_end(settings: Settings) -> Settings:
     """Return the settings with the drive ending at the end of its leg, as in the paper's experiment.
 
-    Raises `UserError`: the leg has no end.
+    Raises
+    ------
+    UserError
+        The leg has no end.
     """
     ahead = settings.behaviors.move_ahead
     if ahead.distance_m is None:
@@ -118,7 +125,10 @@ def stop_at_leg_end(settings: Settings) -> Settings:
 def require_finished(run: SimulationResult, seed: int, seconds_max: float) -> None:
     """Check that a drive reached the end of the hall; seed and time limit (s) are for the message.
 
-    Raises `UserError`: the robot stopped, touched an obstacle, or did not arrive within `seconds_max`.
+    Raises
+    ------
+    UserError
+        The robot stopped, touched an obstacle, or did not arrive within `seconds_max`.
     """
     if run.state.mode.mode is Mode.SAFE_STOP:
         raise UserError(

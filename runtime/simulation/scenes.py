@@ -57,8 +57,13 @@ class Hall:
 def halls(name: SceneName, seed: int = 0) -> tuple[Hall, ...]:
     """Return the halls of a scene.
 
-    `seed`: of the drums' offsets in `moved` and `jit10`, which are the same in both, and of everything in `halls`.
-    The other scenes do not depend on it.
+    Parameters
+    ----------
+    name : SceneName
+        The scene.
+    seed : int
+        Of the drums' offsets in `moved` and `jit10`, which are the same in both, and of everything in `halls`. The
+        other scenes do not depend on it.
     """
     return _SCENES[name](seed)
 

@@ -104,8 +104,12 @@ class BackgroundWriter(Generic[Item]):
     def put(self, item: Item, *, always: bool = False) -> bool:
         """Queue an item and return True; count it as lost and return False if the queue is full.
 
-        `item`: what to write; it must not change any more. `always`: queue it even if the queue is full: for the few
-        items without which later ones cannot be read.
+        Parameters
+        ----------
+        item : Item
+            What to write; it must not change any more.
+        always : bool
+            Queue it even if the queue is full: for the few items without which later ones cannot be read.
         """
         if len(self._queue) >= self._capacity and not always:
             self._refused += 1

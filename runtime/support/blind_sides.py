@@ -121,7 +121,12 @@ def _gap_notes(settings: Settings) -> list[str]:
 def _gaps_m(settings: Settings, half_rad: float) -> list[tuple[float, float]]:
     """Return width and range (from the rim) of the gap between each two neighbouring beams that end side by side, m.
 
-    `settings`: the run's: its ring's mounts and the body's radius. `half_rad`: half of the beams' opening, rad.
+    Parameters
+    ----------
+    settings
+        The run's: its ring's mounts and the body's radius.
+    half_rad
+        Half of the beams' opening, rad.
     """
     mounts = sorted(settings.ring.mounts, key=lambda mount: mount[2] % math.tau)
     gaps = []
@@ -151,8 +156,13 @@ def way_refusal(settings: Settings, course_rad: float | None) -> str | None:
 
     The robot comes to any place if the courses that it may drive lie all round. Otherwise it comes only to directions
     between two of them that are less than 180° apart.
-    `settings`: the run's. `course_rad`: direction of the place from the robot, in the ring's frame, rad; None: it may
-    lie anywhere.
+
+    Parameters
+    ----------
+    settings : Settings
+        The run's.
+    course_rad : float or None
+        Direction of the place from the robot, in the ring's frame, rad; None: it may lie anywhere.
     """
     if not settings.body.synchro or not blind_sides_deg(settings):
         return None
@@ -183,7 +193,10 @@ def way_refusal(settings: Settings, course_rad: float | None) -> str | None:
 def refuse_blind_ways(settings: Settings) -> None:
     """Raise an error if the run's goal or mission leads where the ring never looks.
 
-    Raises `UserError`: it does; the text says where the robot can drive.
+    Raises
+    ------
+    UserError
+        It does; the text says where the robot can drive.
     """
     goal, course_rad = settings.goal, None
     if goal is not None and goal.frame == "odom":

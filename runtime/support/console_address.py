@@ -53,7 +53,10 @@ def announced(url: str, folder: Path) -> Iterator[None]:
 def find_consoles(folder: Path) -> list[str]:
     """Return the start URLs of this user's runs on this machine, the newest first.
 
-    Raises `UserError`: there is no run, or a file is not this user's alone.
+    Raises
+    ------
+    UserError
+        There is no run, or a file is not this user's alone.
     """
     found = []
     with contextlib.suppress(OSError):
@@ -69,8 +72,12 @@ def find_consoles(folder: Path) -> list[str]:
 def find_console(folder: Path, address: str | None = None) -> str:
     """Return the start URL of the newest run, or of the run at an address that is given without its token.
 
-    `folder`: as of `find_consoles`, and it raises the same. `address`: URL of a run's page. One with a token, or of
-    no run on this machine, is returned as it is.
+    Parameters
+    ----------
+    folder : Path
+        As of `find_consoles`, and it raises the same.
+    address : str, optional
+        URL of a run's page. One with a token, or of no run on this machine, is returned as it is.
     """
     if address is None:
         return find_consoles(folder)[0]

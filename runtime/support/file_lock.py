@@ -26,8 +26,18 @@ def file_lock(path: Path, named: str) -> Iterator[None]:
     """Lock the file at `path` during the block; create it if it does not exist, and leave its content untouched.
 
     Only regular files are locked: a pipe or /dev/null has no content that two writers could spoil.
-    `path`: the file. `named`: how an error message names it, e.g. ``--record run.csv``.
-    Raises `UserError`: another process holds the lock, or the file cannot be opened.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    named : str
+        How an error message names it, e.g. ``--record run.csv``.
+
+    Raises
+    ------
+    UserError
+        Another process holds the lock, or the file cannot be opened.
     """
     try:
         fd = _lock(path)

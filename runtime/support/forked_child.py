@@ -70,9 +70,19 @@ class ForkedChild:
 async def fork(main: Callable[[], None], arguments: Sequence[str], environment: Mapping[str, str]) -> ForkedChild:
     """Call `main` in a copy of this process, in a session of its own, with pipes as its standard streams.
 
-    `main`: runs the program, as if it had just been started; its end is that of the process. `arguments`: of the
-    program, without its name. `environment`: variables of its environment beside those of this process.
-    Raises `OSError`: the system makes no further process, or no further files.
+    Parameters
+    ----------
+    main : callable
+        Runs the program, as if it had just been started; its end is that of the process.
+    arguments : sequence of str
+        Of the program, without its name.
+    environment : mapping
+        Variables of its environment beside those of this process.
+
+    Raises
+    ------
+    OSError
+        The system makes no further process, or no further files.
     """
     (inputs, to_child), (from_child, outputs), (errors_of_child, errors) = os.pipe(), os.pipe(), os.pipe()
     for stream in (sys.stdout, sys.stderr):

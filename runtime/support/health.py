@@ -32,7 +32,12 @@ _ASYNCIO_FOLDER: Final = str(Path(asyncio.__file__).parent)
 class Worker(threading.Thread):
     """A daemon thread that keeps the exception that ended it.
 
-    `name`: name of the part. `work`: what the thread does; it returns only at the end of the run.
+    Parameters
+    ----------
+    name : str
+        Name of the part.
+    work : callable
+        What the thread does; it returns only at the end of the run.
     """
 
     def __init__(self, name: str, work: Callable[[], None]) -> None:

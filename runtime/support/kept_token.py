@@ -24,8 +24,17 @@ _BYTES_MAX: Final = 200
 def kept_token(folder: Path, make: Callable[[], str]) -> str:
     """Return the token that is kept in a folder; make and keep one if there is none.
 
-    `folder`: the program's state folder; created if it does not exist. `make`: returns a new token.
-    Raises `UserError`: the file holds no token, others may read or write it, or it cannot be read or created.
+    Parameters
+    ----------
+    folder : Path
+        The program's state folder; created if it does not exist.
+    make : callable
+        Returns a new token.
+
+    Raises
+    ------
+    UserError
+        The file holds no token, others may read or write it, or it cannot be read or created.
     """
     path = folder / NAME
     try:
@@ -58,7 +67,10 @@ def _create(path: Path, make: Callable[[], str]) -> None:
 def _read(path: Path) -> str:
     """Return the file's token.
 
-    Raises `UserError`: it holds none, or is not this user's alone.
+    Raises
+    ------
+    UserError
+        It holds none, or is not this user's alone.
     """
     held = read_private(path, _BYTES_MAX)
     if held is None:

@@ -105,7 +105,11 @@ def cache_folder() -> Path:
     Numba unpickles what it finds there, so a user who can write into it can run code as this one. It is in the user's
     cache; where that cannot be written or others can write into it, it is a new folder for this process and its
     children, which is removed at the end.
-    Raises `UserError`: neither can be created.
+
+    Raises
+    ------
+    UserError
+        Neither can be created.
     """
     own = users_own(user_cache_path)
     if own is not None:
@@ -135,7 +139,10 @@ def _is_ours(folder: Path) -> bool:
 def use_kernel_cache() -> Path:
     """Set numba's cache folder, unless the environment names one; call this before importing numba.
 
-    Returned: the folder in it that says which parts of these sources are compiled.
+    Returns
+    -------
+    Path
+        The folder in it that says which parts of these sources are compiled.
     """
     kernels = os.environ.get("NUMBA_CACHE_DIR")
     if not kernels:  # numba takes an empty one for none, too

@@ -97,8 +97,14 @@ class InThread(Protocol):
 class KernelLoader:
     """Prepare kernels while the robot drives.
 
-    `log`: receives a line when kernels have to be compiled. `compile_part`: compiles a part in another process.
-    `preparation`: is waited for: else what it loads meanwhile would be counted twice.
+    Parameters
+    ----------
+    log : structlog logger
+        Receives a line when kernels have to be compiled.
+    compile_part : callable, optional
+        Compiles a part in another process.
+    preparation : KernelPreparation, optional
+        Is waited for: else what it loads meanwhile would be counted twice.
     """
 
     def __init__(
@@ -144,7 +150,13 @@ class KernelPreparation:
 
     Another process compiles what never was, at low priority; then a thread loads all. The emulator runs uncompiled
     meanwhile; its kernels are compiled last, for the next start.
-    `parts`: those of `PARTS` that the run needs, the emulator's among them if it has one. `host_clock`: monotonic, s.
+
+    Parameters
+    ----------
+    parts : sequence of str
+        Those of `PARTS` that the run needs, the emulator's among them if it has one.
+    host_clock : callable
+        Monotonic, s.
     """
 
     def __init__(self, parts: Sequence[str], host_clock: Callable[[], float] = time.monotonic) -> None:
@@ -200,7 +212,11 @@ class KernelPreparation:
         """Return what recognition begins with, when no kernel of the other parts is left to compile or to load.
 
         Both are loaded and made in threads of `in_thread`.
-        Raises `UserError`: they could not be compiled.
+
+        Raises
+        ------
+        UserError
+            They could not be compiled.
         """
         if uncompiled_parts(self._folder, self._all_parts):
             self._process = await start_child(
@@ -254,8 +270,14 @@ def begin_preparation(settings: Settings) -> KernelPreparation | None:
 def progress_text(done: int, expected: int, elapsed_s: float, what: str = PREPARING) -> str:
     """Return how far compiling is, for the operator.
 
-    `done`, `expected`: kernels compiled, of how many. `elapsed_s`: since the start, s. `what`: what is being
-    compiled.
+    Parameters
+    ----------
+    done, expected : int
+        Kernels compiled, of how many.
+    elapsed_s : float
+        Since the start, s.
+    what : str
+        What is being compiled.
     """
     text = f"{what}: {done} of {expected} kernels"
     if done >= expected or done < expected * SHARE_MIN:

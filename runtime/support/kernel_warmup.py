@@ -343,8 +343,14 @@ def warm_up(settings: Settings, parts: Iterable[str]) -> None:
 def prepare_kernels(settings: Settings, console: Console, parts: Iterable[str] | None = None) -> None:
     """Load every kernel, and first compile those that never were, with a notice that this takes a while.
 
-    `settings`: ring, models and constants of the run. `console`: where the notice is shown. `parts`: of `PARTS`; by
-    default those that a run with these settings needs.
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and constants of the run.
+    console : Console
+        Where the notice is shown.
+    parts : iterable of str, optional
+        Of `PARTS`; by default those that a run with these settings needs.
     """
     folder = use_kernel_cache()
     if is_interpreted():

@@ -24,8 +24,13 @@ HEAD_LINES: Final = 10
 class LogFile:
     """An open log file. Every method raises OSError if the disk fails.
 
-    `path`: created if it does not exist, with its folder; only this user may read it. A device or a pipe is written
-    to as it is. `bytes_max`: size at which a file is full.
+    Parameters
+    ----------
+    path : Path
+        Created if it does not exist, with its folder; only this user may read it. A device or a pipe is written to
+        as it is.
+    bytes_max : int
+        Size at which a file is full.
 
     Raises
     ------
@@ -87,7 +92,10 @@ class LogFile:
 def may_be_log(path: Path) -> bool:
     """Return whether there is no such file, nothing in it, or a log: one of its first lines is an event in JSON.
 
-    Raises `OSError`: the file cannot be read.
+    Raises
+    ------
+    OSError
+        The file cannot be read.
     """
     try:
         if not path.is_file():

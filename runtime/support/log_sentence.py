@@ -16,8 +16,12 @@ NOTHING: Final = frozenset({"", "None", "null"})
 def sentence(event: str, fields: Mapping[str, object]) -> str:
     """Return the sentence, as "Mode SAFE_STOP: HALT by the operator (cycle 12)".
 
-    `event`: what happened. A field of that name describes it, and a field "reason" says why. `fields`: what else is
-    known; fields without a value are left out.
+    Parameters
+    ----------
+    event : str
+        What happened. A field of that name describes it, and a field "reason" says why.
+    fields : mapping
+        What else is known; fields without a value are left out.
     """
     known = {name: text for name, value in fields.items() if (text := field_text(value)) not in NOTHING}
     what, reason = known.pop(event, None), known.pop("reason", None)

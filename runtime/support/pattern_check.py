@@ -101,7 +101,12 @@ def more_looks(ring: RingConfig) -> str:
 def pattern_speed_m_s(settings: Settings, missed: int = 0) -> float:
     """Return the speed that the firing pattern allows on every leg, at its oldest looks, m/s.
 
-    `settings`: the robot and its settings. `missed`: readings in a row of each sensor that failed.
+    Parameters
+    ----------
+    settings
+        The robot and its settings.
+    missed
+        Readings in a row of each sensor that failed.
     """
     clearance_m = settings.behaviors.arbiter.clearance_m
     courses = courses_rad(settings)
@@ -181,8 +186,12 @@ def crosstalk_note(ring: RingConfig) -> str | None:
 def ring_that_drives(beam_deg: float, path_deg: float) -> str:
     """Return which sensors look along the whole path: the fewest in front, and all round.
 
-    `beam_deg`: half the width of a beam, degrees. `path_deg`: the path's directions, to either side of the way,
-    degrees.
+    Parameters
+    ----------
+    beam_deg
+        Half the width of a beam, degrees.
+    path_deg
+        The path's directions, to either side of the way, degrees.
     """
     count = max(1, math.ceil(path_deg / beam_deg - 1e-6))
     apart_deg = math.floor(2.0 * beam_deg + 1e-6)
@@ -195,8 +204,15 @@ def oldest_percept(settings: Settings, course_rad: float, missed: int = 0) -> Pe
     """Return what a robot in the open sees when every sensor's look is as old as the pattern lets it become.
 
     An echo arrives when its window has closed, and waits for a cycle at most.
-    `settings`: the robot and its settings. `course_rad`: its heading in the ring's frame. `missed`: readings in a row
-    of each sensor that failed.
+
+    Parameters
+    ----------
+    settings
+        The robot and its settings.
+    course_rad
+        Its heading in the ring's frame.
+    missed
+        Readings in a row of each sensor that failed.
     """
     ring = settings.ring
     pattern, mounts = firing_pattern(ring), mounts_array(ring.mounts)

@@ -23,8 +23,14 @@ LINES_PERIOD_S: Final = 0.25
 def progress(console: Console, what: str, total: int | None = None) -> Iterator[Callable[[], None]]:
     """Show a progress bar on a terminal while the block runs; yield the function to call after each step.
 
-    `console`: where it is shown, if that is a terminal. `what`: what is being done. `total`: number of steps, where
-    it is known.
+    Parameters
+    ----------
+    console : Console
+        Where it is shown, if that is a terminal.
+    what : str
+        What is being done.
+    total : int, optional
+        Number of steps, where it is known.
     """
     if os.environ.get(PROGRESS_LINES):
         yield _lines(what, total)

@@ -32,8 +32,14 @@ def console_before() -> ConsoleBefore | None:
 def restart_refusal(own_files: Mapping[str, str | None], *, force: bool, was_chosen: bool) -> str | None:
     """Return why the command line of a run could not be carried out again, None if it could.
 
-    `own_files`: by option, the file that the run writes, None for no file. `force`: whether it may overwrite them.
-    `was_chosen`: whether the port was chosen in the terminal, and not by the command line.
+    Parameters
+    ----------
+    own_files : mapping
+        By option, the file that the run writes, None for no file.
+    force : bool
+        Whether it may overwrite them.
+    was_chosen : bool
+        Whether the port was chosen in the terminal, and not by the command line.
     """
     if was_chosen:
         return "the port of this run was chosen in its terminal: start it again there, or with --port"
@@ -46,7 +52,10 @@ def restart_refusal(own_files: Mapping[str, str | None], *, force: bool, was_cho
 class Restart:
     """Whether this program is to be started again when it has ended in order.
 
-    `refusal`: why its command line cannot be carried out twice; None if it can.
+    Parameters
+    ----------
+    refusal : str, optional
+        Why its command line cannot be carried out twice; None if it can.
     """
 
     def __init__(self, refusal: str | None) -> None:

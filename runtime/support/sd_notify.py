@@ -21,8 +21,12 @@ STATUS_MAX: Final = 400
 class SdNotifier:
     """Sends messages to the service manager; does nothing without one.
 
-    `address`: path of the socket, or its abstract name after an ``@``. `watchdog_s`: timeout of the manager's
-    watchdog; None without a watchdog.
+    Parameters
+    ----------
+    address : str, optional
+        Path of the socket, or its abstract name after an ``@``.
+    watchdog_s : float, optional
+        Timeout of the manager's watchdog; None without a watchdog.
     """
 
     def __init__(self, address: str | None = None, watchdog_s: float | None = None) -> None:

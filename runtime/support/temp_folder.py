@@ -27,7 +27,10 @@ YOUNG_S: Final = 60.0
 def temp_folder() -> Iterator[Path]:
     """Yield a new folder for temporary files that only this user can enter, and remove it at the end.
 
-    Raises `OSError`: it cannot be created.
+    Raises
+    ------
+    OSError
+        It cannot be created.
     """
     remove_stale_folders()
     with tempfile.TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True) as name:

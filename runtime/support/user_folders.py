@@ -25,7 +25,10 @@ NAME: Final = "echolocate"
 def state_folder() -> Path:
     """Return the folder for logs and recordings; without a home folder, a new one that only this user can enter.
 
-    Raises `UserError`: there is no home folder, and no temporary folder can be created.
+    Raises
+    ------
+    UserError
+        There is no home folder, and no temporary folder can be created.
     """
     return users_own(user_state_path) or _temporary_folder()
 
@@ -51,7 +54,10 @@ def users_own(find: Callable[[str], Path]) -> Path | None:
 def read_private(path: Path, bytes_max: int) -> bytes | None:
     """Return the first bytes of a file that is this user's alone; None if others can read or write it.
 
-    Raises `OSError`: it cannot be read, or is a link.
+    Raises
+    ------
+    OSError
+        It cannot be read, or is a link.
     """
     fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
     try:
@@ -77,7 +83,10 @@ def _temporary_folder() -> Path:
 def expanded(path: str, setting: str) -> Path:
     """Return the path that a setting names, with ``~`` and ``~name`` replaced by the home folder of a user.
 
-    Raises `UserError`: there is no such user, or the user has no home folder.
+    Raises
+    ------
+    UserError
+        There is no such user, or the user has no home folder.
     """
     try:
         return Path(path).expanduser()

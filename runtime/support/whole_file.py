@@ -12,7 +12,10 @@ from pathlib import Path
 def whole_file(path: Path) -> Iterator[Path]:
     """Yield a path to write; afterwards the file is renamed to `path`, which is so never half written.
 
-    Raises `OSError`: it cannot be written.
+    Raises
+    ------
+    OSError
+        It cannot be written.
     """
     part = path.with_name(f".{path.name}.{os.getpid()}")
     try:

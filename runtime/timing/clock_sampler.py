@@ -40,7 +40,10 @@ class ClockSample(NamedTuple):
 class ClockSampler:
     """Reads the clocks of the calling thread.
 
-    `clock`: the run's, or any monotonic clock, s.
+    Parameters
+    ----------
+    clock : callable
+        The run's, or any monotonic clock, s.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:

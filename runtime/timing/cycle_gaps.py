@@ -33,7 +33,12 @@ REST_MAX_S: Final = 0.1
 class CycleGaps:
     """Runs functions in threads that work only between cycles.
 
-    `clock`: monotonic, s. `rest_max_s`: longest rest.
+    Parameters
+    ----------
+    clock : callable
+        Monotonic, s.
+    rest_max_s : float
+        Longest rest.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, rest_max_s: float = REST_MAX_S) -> None:

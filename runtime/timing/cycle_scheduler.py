@@ -31,8 +31,14 @@ OVERRUN: Final = "{} cycles in a row left no time for the next one, mostly throu
 class CycleScheduler:
     """Decides when cycles begin and measures them.
 
-    `settings`: rate, firing step, and the limit on overruns. `clock`: the run's, or any monotonic clock, s.
-    `callbacks`: names of the callbacks that `timing_monitor` will measure.
+    Parameters
+    ----------
+    settings : Settings
+        Rate, firing step, and the limit on overruns.
+    clock : callable
+        The run's, or any monotonic clock, s.
+    callbacks : tuple of str
+        Names of the callbacks that `timing_monitor` will measure.
     """
 
     def __init__(self, settings: Settings, clock: Callable[[], float], callbacks: tuple[str, ...] = ()) -> None:

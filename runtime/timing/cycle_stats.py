@@ -81,8 +81,12 @@ class Series:
 class CycleStats:
     """Durations, lateness and causes of delay of a run's cycles.
 
-    `late_after_s`: a cycle that begins later than this after its deadline is late. `is_touched`: allocate all memory
-    now.
+    Parameters
+    ----------
+    late_after_s : float
+        A cycle that begins later than this after its deadline is late.
+    is_touched : bool
+        Allocate all memory now.
     """
 
     def __init__(self, late_after_s: float, *, is_touched: bool = False) -> None:

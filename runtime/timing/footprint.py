@@ -39,7 +39,10 @@ class FootprintRow(TypedDict):
 class Footprint:
     """Measures this process from now, when the first cycle is about to begin, to `close`.
 
-    `memory`: counts the collections.
+    Parameters
+    ----------
+    memory : MemoryPolicy
+        Counts the collections.
     """
 
     def __init__(self, memory: MemoryPolicy) -> None:

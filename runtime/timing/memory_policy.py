@@ -39,7 +39,10 @@ def no_collection() -> Iterator[None]:
 class MemoryPolicy:
     """Decides when garbage is collected, and counts collections.
 
-    `collect`: collects the objects of a generation and of the younger ones.
+    Parameters
+    ----------
+    collect : callable
+        Collects the objects of a generation and of the younger ones.
     """
 
     def __init__(self, collect: Callable[[int], object] = gc.collect) -> None:

@@ -113,8 +113,13 @@ class Pacer:
     def on_echo(self, run_s: float, busy_since_s: float | None = None) -> None:
         """Count an echo: it begins the next cycle at once unless it comes too early for that.
 
-        `run_s`: when it was read. `busy_since_s`: since when the loop has been busy and has not read the line: the
-        echo may have arrived as early. Then it counts as having arrived when it was expected.
+        Parameters
+        ----------
+        run_s : float
+            When it was read.
+        busy_since_s : float, optional
+            Since when the loop has been busy and has not read the line: the echo may have arrived as early. Then it
+            counts as having arrived when it was expected.
         """
         arrived_s = run_s
         if busy_since_s is not None:

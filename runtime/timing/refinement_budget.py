@@ -56,7 +56,12 @@ class QuantumBudget:
 class CpuTimeBudget:
     """An amount of time a cycle, the part of perception that always runs included, as in the robot's own process.
 
-    `budget_s`: for a cycle, s. `clock`: monotonic, s; by default the CPU time of this thread.
+    Parameters
+    ----------
+    budget_s : float
+        For a cycle, s.
+    clock : callable
+        Monotonic, s; by default the CPU time of this thread.
     """
 
     def __init__(self, budget_s: float, clock: Callable[[], float] = time.thread_time) -> None:

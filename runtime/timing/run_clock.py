@@ -73,7 +73,12 @@ def run_clock(clock: Callable[[], float]) -> RunClock:
 class ScaledClock(RunClock):
     """A clock that shares its time scale with the emulator, and never passes the time that the emulator has reached.
 
-    `host`: monotonic, s; the emulator's as well. `send`: sends each new time scale to the emulator.
+    Parameters
+    ----------
+    host : callable
+        Monotonic, s; the emulator's as well.
+    send : callable
+        Sends each new time scale to the emulator.
     """
 
     def __init__(

@@ -84,7 +84,12 @@ class NoTimeControl:
 class EmulatorTimeControl:
     """Controls the time of an emulator and of the run on it.
 
-    `send`: sends a line to the emulator. `clock`: the run's; the process must use the same one.
+    Parameters
+    ----------
+    send : callable
+        Sends a line to the emulator.
+    clock : ScaledClock
+        The run's; the process must use the same one.
     """
 
     def __init__(self, send: Callable[[bytes], None], clock: ScaledClock) -> None:

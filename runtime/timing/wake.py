@@ -44,7 +44,10 @@ class Timer(Protocol):
 class TimerFd:
     """A timer of the kernel, exact, and Linux only; the callback is called in the loop that runs now.
 
-    Raises `OSError`: this system has no such timer.
+    Raises
+    ------
+    OSError
+        This system has no such timer.
     """
 
     def __init__(self, callback: Callable[[], None]) -> None:

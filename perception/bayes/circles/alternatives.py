@@ -30,7 +30,12 @@ def bearing_if_near(
 ) -> tuple[float, float]:  # fmt: skip
     """Return the unit direction from a sensor to a circle's centre; zeros if its reading ends elsewhere.
 
-    `predicted`, `cx`, `cy`, `gate`: as for `mean_bearing`.
+    Parameters
+    ----------
+    q, j : Reading, int
+        The reading, and which it is.
+    predicted, cx, cy, gate
+        As for `mean_bearing`.
     """
     d = predicted.distance[j]
     if abs(predicted.error[j]) < gate and d > 0.0:
@@ -44,8 +49,14 @@ def mean_bearing(
 ) -> tuple[float, float]:  # fmt: skip
     """Return the mean unit direction from the sensors that hear a circle to its centre; zeros without such a sensor.
 
-    `readings`, shape (n,): raw ranges. `predicted`: what the circle predicts of them. `cx`, `cy`, `gate`: the
-    circle's centre, and the greatest distance of a reading's end from it, m.
+    Parameters
+    ----------
+    readings : (n,) Reading
+        Raw ranges.
+    predicted : Predictions
+        What the circle predicts of them.
+    cx, cy, gate : float
+        The circle's centre, and the greatest distance of a reading's end from it, m.
     """
     sx = 0.0
     sy = 0.0
@@ -64,7 +75,15 @@ def score(s: StateRecord, p: SettingsRecord, n: int, x: float, y: float, radius:
     """Return the log likelihood ratio (nat) of a circle to the background, on the first `n` readings of the scratch.
 
     Writes the scratch's `score` and `predicted`.
-    `s`, `p`: memory and settings. `n`: readings. `x`, `y`, `radius`: the circle, m.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    n : int
+        Readings.
+    x, y, radius : float
+        The circle, m.
     """
     scratch = s[0].scratch
     score_circle(scratch.readings[:n], x, y, radius, p, s[0].noise_level, scratch.predicted, scratch.score)
@@ -118,7 +137,10 @@ def fit_other_line(
 ) -> float:
     """Return the log ratio (nat) of a line along the same surface; write the scratch's `line_fit` about the centre.
 
-    `s`, `p`, `n`, `circle`, `bearing`, `steps`: as for `fit_other_circle`.
+    Parameters
+    ----------
+    s, p, n, circle, bearing, steps
+        As for `fit_other_circle`.
     """
     scratch = s[0].scratch
     readings = scratch.readings[:n]

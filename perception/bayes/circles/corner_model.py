@@ -38,7 +38,14 @@ from perception.records import Records
 def face_error(q: Reading, cx: float, cy: float, face: LineFit) -> float:
     """Return the range of a reading less its perpendicular distance to a face, or a cross path's half over it, m.
 
-    `cx`, `cy`: origin of the face's line, m. `face`: unit normal and distance of the face from the origin.
+    Parameters
+    ----------
+    q : Reading
+        The reading.
+    cx, cy : float
+        Origin of the face's line, m.
+    face : LineFit
+        Unit normal and distance of the face from the origin.
     """
     if face.rays == 0 and not is_crossed(q):
         return q.range_m - face.distance + face.normal_x * (q.x - cx) + face.normal_y * (q.y - cy)
@@ -89,7 +96,12 @@ def is_of_face(
 def find_edge(cx: float, cy: float, corner: CornerFit) -> bool:
     """Write the point where two faces meet; return False where the faces are too nearly parallel.
 
-    `cx`, `cy`: origin of the faces' lines, m. `corner`: the faces; their edge is written.
+    Parameters
+    ----------
+    cx, cy : float
+        Origin of the faces' lines, m.
+    corner : CornerFit
+        The faces; their edge is written.
     """
     a = corner.faces[0]
     b = corner.faces[1]
@@ -107,7 +119,12 @@ def find_facing(
 ) -> tuple[int, float, float]:  # fmt: skip
     """Write the places of the readings that end near a circle; return their number and the sum of their bearings.
 
-    `readings`, `predicted`, `cx`, `cy`, `gate`: as for `alternatives.mean_bearing`. `facing`, shape (≥ n,): out.
+    Parameters
+    ----------
+    readings, predicted, cx, cy, gate
+        As for `alternatives.mean_bearing`.
+    facing : (≥ n,) int
+        Out.
     """
     count = 0
     sx = 0.0
@@ -216,8 +233,12 @@ def way_of_face(
 ) -> float:
     """Return on which side of the edge a face lies along its line, 1 or −1: where most of its echoes have their feet.
 
-    `readings`, `facing`, `cx`, `cy`: as for `fit_faces`; the circle's centre, m. `corner`, `side`, `cos_may`: as for
-    `is_of_face`.
+    Parameters
+    ----------
+    readings, facing, cx, cy
+        As for `fit_faces`; the circle's centre, m.
+    corner, side, cos_may
+        As for `is_of_face`.
     """
     face, other = corner.faces[side], corner.faces[1 - side]
     more = 0

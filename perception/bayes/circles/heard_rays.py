@@ -66,7 +66,12 @@ def try_other_rays(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind
 def lead_of_rays(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: int, rays: int) -> float:
     """Return the lead of a circle heard by so many rays over all that explains its readings as heard here, nat.
 
-    `s`, `tracks`, `p`, `kind`: as for `try_other_rays`. `rays`: as in `State`.
+    Parameters
+    ----------
+    s, tracks, p, kind
+        As for `try_other_rays`.
+    rays : int
+        As in `State`.
     """
     scratch = s[0].scratch
     fit = scratch.circle_fit
@@ -101,8 +106,14 @@ def lead_of_rays(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: 
 def evidence_by_rays(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int, rays: int) -> float:
     """Return the evidence of the circle that best explains a track's readings, heard by so many rays, nat.
 
-    `s`, `p`, `track`: memory, settings, and the track. `n`: its readings, the first of the scratch, whose `predicted`
-    is of the track. `rays`: as in `State`.
+    Parameters
+    ----------
+    s, p, track
+        Memory, settings, and the track.
+    n : int
+        Its readings, the first of the scratch, whose `predicted` is of the track.
+    rays : int
+        As in `State`.
     """
     scratch = s[0].scratch
     bearing = mean_bearing(scratch.readings[:n], scratch.predicted, track.x, track.y, p[0].gate_m)
@@ -119,7 +130,14 @@ def evidence_by_rays(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: i
 def lead_of_track(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int, rays: int) -> float:
     """Return how much likelier a track's readings are heard by so many rays than as heard here, nat.
 
-    `s`, `tracks`, `p`: memory, circles and settings. `t`: the track. `rays`: as in `State`.
+    Parameters
+    ----------
+    s, tracks, p
+        Memory, circles and settings.
+    t : int
+        The track.
+    rays : int
+        As in `State`.
     """
     track = tracks[t]
     n = copy_reservoir(track, s[0].scratch.readings)
@@ -134,7 +152,14 @@ def lead_of_track(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: in
 def compare_rays(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> None:
     """Compare a track with the best circle heard by the next number of rays, on the same readings.
 
-    `s`, `p`: memory and settings. `track`: updated. `n`: its readings, the first of the scratch.
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : CircleTrack
+        Updated.
+    n : int
+        Its readings, the first of the scratch.
     """
     track.other_rays = next_rays(track.other_rays, s[0].rays)
     here = score(s, p, n, track.x, track.y, track.radius)
@@ -159,7 +184,12 @@ def decide_rays(s: StateRecord, tracks: CircleTracks, p: SettingsRecord) -> None
 def change_rays(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, rays: int) -> None:
     """Hear the place by another number of rays from now on; its objects are refined anew.
 
-    `s`, `tracks`, `p`: memory and circles, updated, and settings. `rays`: as in `State`.
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    rays : int
+        As in `State`.
     """
     s[0].rays = rays
     assume_rays(s, p, rays)

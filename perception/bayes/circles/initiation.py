@@ -159,7 +159,12 @@ def start_circle(
 ) -> int:  # fmt: skip
     """Start a tentative track on the first `n` readings of the scratch; return its index, or −1 without a free track.
 
-    `s`, `tracks`: memory and circles, updated. `kind`, `radius`, `x`, `y`, `n`: as for `restart_circle`.
+    Parameters
+    ----------
+    s, tracks
+        Memory and circles, updated.
+    kind, radius, x, y, n
+        As for `restart_circle`.
     """
     t = free_track(tracks)
     if t < 0:
@@ -177,7 +182,13 @@ def gather_relevant(
 
     They are the first of the scratch's `readings`; `predicted` and `others` are overwritten, too. The circle is heard
     by the rays that `assume_rays` set last: call that first. It has no track yet, so any track may explain a reading.
-    `s`, `tracks`, `p`: memory, circles and settings. `x`, `y`, `radius`: the circle, m.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory, circles and settings.
+    x, y, radius : float
+        The circle, m.
     """
     return keep_relevant(s, tracks, p, gather_history(s, p, x, y, radius), x, y, radius, -1)
 
@@ -193,8 +204,15 @@ def initiate_circle(
     """Try a circle behind a segment and start a track if the readings support it; return 1 if that took work.
 
     Where they do not, it is tried by another number of rays at times, which may be how the place is heard.
-    `s`, `tracks`, `p`: memory and circles, updated, and settings. `kind`: index of the circle. `x`, `y`, `nx`, `ny`:
-    the segment's middle (m) and unit normal, away from the sensors.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    kind : int
+        Index of the circle.
+    x, y, nx, ny : float
+        The segment's middle (m) and unit normal, away from the sensors.
     """
     radius = p[0].circles[kind].radius_m
     hypothesis = s[0].scratch.hypothesis
@@ -248,7 +266,10 @@ def best_circle(
 def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: int, nx: float, ny: float) -> int:
     """Start a track at the scratch's hypothesis if the readings support it; return which of the outcomes it is.
 
-    `s`, `tracks`, `p`, `kind`, `nx`, `ny`: as for `initiate_circle`.
+    Parameters
+    ----------
+    s, tracks, p, kind, nx, ny
+        As for `initiate_circle`.
     """
     scratch = s[0].scratch
     fit = scratch.circle_fit

@@ -21,8 +21,12 @@ from perception.kernel import kernel
 def mean_hearer(s: StateRecord, p: SettingsRecord, n: int) -> tuple[float, float, int]:
     """Return the mean place of the sensors that hear the circle last predicted for, m, and their number.
 
-    `s`, `p`: memory, whose scratch holds the predictions, and settings. `n`: number of readings, the first of the
-    scratch.
+    Parameters
+    ----------
+    s, p
+        Memory, whose scratch holds the predictions, and settings.
+    n : int
+        Number of readings, the first of the scratch.
     """
     readings, predicted = s[0].scratch.readings, s[0].scratch.predicted
     x = 0.0
@@ -50,7 +54,15 @@ def search_across(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int)
 
     The positions lie on an arc about the mean of the sensors that hear the track, so that its ranges change as little
     as possible.
-    `s`, `p`: memory and settings. `track`: updated. `n`: number of its readings, the first of the scratch.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : CircleTrack
+        Updated.
+    n : int
+        Number of its readings, the first of the scratch.
     """
     best = score(s, p, n, track.x, track.y, track.radius) + ELSEWHERE_LEAD_NAT
     x, y, heard = mean_hearer(s, p, n)

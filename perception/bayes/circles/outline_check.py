@@ -49,8 +49,14 @@ def sort_errors(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -
     """Write the errors of the readings that a circle answers to the scratch's `bearings`, ascending.
 
     A circle nearer than the ring's shortest range does not count: every such range is the shortest one.
-    `s`, `p`, `track`: memory, of which the first `n` readings of the scratch count and `own` holds what the circle
-    predicts, settings, and the circle. `n`: readings.
+
+    Parameters
+    ----------
+    s, p, track
+        Memory, of which the first `n` readings of the scratch count and `own` holds what the circle predicts,
+        settings, and the circle.
+    n : int
+        Readings.
     """
     scratch = s[0].scratch
     var0, rel2 = noise_variance(s, p)
@@ -116,7 +122,11 @@ def outline_lead(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
 
     Both are divided by D, so that a bearing without readings has accuracy 0 and changes nothing; a Cholesky root of
     I + D⁻½ K D⁻½, a row at a time, then gives the determinant and the whitened means.
-    `s`, `p`, `track`, `n`: as for `sort_errors`.
+
+    Parameters
+    ----------
+    s, p, track, n
+        As for `sort_errors`.
     """
     scratch = s[0].scratch
     bearings, root = scratch.bearings, scratch.outline_root
@@ -159,7 +169,11 @@ def round_lead(s: StateRecord, p: SettingsRecord, n: int) -> float:
     with w the variance of other radii about the circle's::
 
         lead = log N(δ; 0, v + w) − log N(δ; 0, v)
-    `s`, `p`, `n`: as for `sort_errors`.
+
+    Parameters
+    ----------
+    s, p, n
+        As for `sort_errors`.
     """
     var0, rel2 = noise_variance(s, p)
     xx = xy = yy = xr = yr = rr = xe = ye = re = 0.0

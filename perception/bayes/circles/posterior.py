@@ -40,8 +40,12 @@ def linearise(
 ) -> int:  # fmt: skip
     """Write each reading's error and slope along the frame's axes; return the number of readings that count.
 
-    `readings`, `radius`, `p`, `noise`, `posterior`, `predicted`: as for `posterior_circle`. `linear`, shape (≥ n,):
-    out.
+    Parameters
+    ----------
+    readings, radius, p, noise, posterior, predicted
+        As for `posterior_circle`.
+    linear : (≥ n,) LinearReading
+        Out.
     """
     cos_may, gate = p[0].cos_may_answer, p[0].gate_m
     x, y = posterior.x, posterior.y
@@ -68,8 +72,15 @@ def interpolated(row: Floats, last: float, t: float) -> float:
     """Return a level's log likelihood ratio (nat) at a fractional bin, interpolated linearly as in `likelihood`.
 
     This is the method's innermost loop.
-    `row`, shape (bins,): a row of `Settings.table`, nat. `last`: greatest bin to interpolate from; a larger `t` is
-    clipped to it. `t`: error in bins, ≥ 0.
+
+    Parameters
+    ----------
+    row : (bins,) float
+        A row of `Settings.table`, nat.
+    last : float
+        Greatest bin to interpolate from; a larger `t` is clipped to it.
+    t : float
+        Error in bins, ≥ 0.
     """
     t = min(t, last)
     b = np.uintp(int(t))  # an unsigned index is not checked for counting from the end
@@ -80,8 +91,14 @@ def interpolated(row: Floats, last: float, t: float) -> float:
 def score_cells(linear: Records[LinearReading], table: Floats, cells: Floats) -> tuple[int, float]:
     """Sum the log likelihood in each cell of the grid; return the best cell and its log likelihood (nat).
 
-    `linear`, shape (m,): from `linearise`. `table`, shape (levels, bins): from `likelihood.build_table`. `cells`,
-    shape (GRID_CELLS,): out: the cells' log likelihoods (nat), the first axis outermost.
+    Parameters
+    ----------
+    linear : (m,) LinearReading
+        From `linearise`.
+    table : (levels, bins) float
+        From `likelihood.build_table`.
+    cells : (GRID_CELLS,) float
+        Out: the cells' log likelihoods (nat), the first axis outermost.
     """
     last = float(TABLE_BINS - 2)
     for i in range(GRID_SIDE):
@@ -113,7 +130,12 @@ def score_cells(linear: Records[LinearReading], table: Floats, cells: Floats) ->
 def moments(best: float, cells: Floats) -> tuple[float, float, float, float, float]:
     """Return mean and covariance of the grid's mass, in pitches: a, b, aa, ab, bb.
 
-    `best`: greatest log likelihood, nat. `cells`, shape (GRID_CELLS,): from `score_cells`.
+    Parameters
+    ----------
+    best : float
+        Greatest log likelihood, nat.
+    cells : (GRID_CELLS,) float
+        From `score_cells`.
     """
     z = 0.0
     ma = 0.0

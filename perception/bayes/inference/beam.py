@@ -58,9 +58,20 @@ def ray_over_circle(
 
     A circle that lies past the ray by an angle π, of which its own half width takes ω, counts as φ + π − ω off the
     axis, with φ half the beam's opening.
-    `q`, `half_angle`, `rays`: as for `nearest_ray`. `dx`, `dy`, `d`: the circle's centre from the sensor, and its
-    distance, m. `radius`: m.
-    Returned: range, m; its derivatives by the centre; d times the cosine of the angle off the axis.
+
+    Parameters
+    ----------
+    q, half_angle, rays
+        As for `nearest_ray`.
+    dx, dy, d : float
+        The circle's centre from the sensor, and its distance, m.
+    radius : float
+        m
+
+    Returns
+    -------
+    (float, float, float, float)
+        Range, m; its derivatives by the centre; d times the cosine of the angle off the axis.
     """
     ux, uy = nearest_ray(q, dx, dy, half_angle, rays)
     along = ux * dx + uy * dy

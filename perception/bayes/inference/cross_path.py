@@ -41,8 +41,20 @@ def over_circle(q: Reading, dx: float, dy: float, radius: float) -> tuple[float,
     Alhazen's problem: the way is stationary along the arc at the reflecting point. From the arc's point between the
     two directions, weighted by distance, a step of Newton's method goes to within microradians of it; what is left
     of the way is of second order and taken off. The error is below .1 µm from 10 cm on.
-    `q`: a cross path. `dx`, `dy`: the circle's centre from the transmitter, m. `radius`: m; 0 is an edge.
-    Returned: half the way, m, and its derivatives.
+
+    Parameters
+    ----------
+    q : Reading
+        A cross path.
+    dx, dy : float
+        The circle's centre from the transmitter, m.
+    radius : float
+        m; 0 is an edge.
+
+    Returns
+    -------
+    (float, float, float)
+        Half the way, m, and its derivatives.
     """
     ax, ay = -dx, -dy
     bx, by = q.listener_x - dx, q.listener_y - dy
@@ -85,7 +97,15 @@ def is_near_circle(q: Reading, d: float, radius: float, gate: float) -> bool:
     """Return whether half a cross path may be within `gate` (m) of what a circle predicts.
 
     The way to the listener is longer or shorter than the way back by the distance of the two at most.
-    `d`, `radius`: distance of the circle's centre from the sensor that fired, and its radius, m. `gate`: m.
+
+    Parameters
+    ----------
+    q : Reading
+        A reading.
+    d, radius : float
+        Distance of the circle's centre from the sensor that fired, and its radius, m.
+    gate : float
+        m
     """
     slack = gate + 0.5 * (abs(q.listener_x) + abs(q.listener_y))
     return abs(q.range_m + radius - d) <= slack
@@ -95,7 +115,14 @@ def is_near_circle(q: Reading, d: float, radius: float, gate: float) -> bool:
 def circle_error(q: Reading, dx: float, dy: float, d: float, radius: float) -> float:
     """Return a range, or half a cross path, less what a circle predicts, m.
 
-    `dx`, `dy`, `d`: the circle's centre from the sensor that fired, and its distance, m. `radius`: m.
+    Parameters
+    ----------
+    q : Reading
+        The reading.
+    dx, dy, d : float
+        The circle's centre from the sensor that fired, and its distance, m.
+    radius : float
+        m
     """
     if is_crossed(q):
         half, _, _ = over_circle(q, dx, dy, radius)
@@ -107,8 +134,14 @@ def circle_error(q: Reading, dx: float, dy: float, d: float, radius: float) -> f
 def over_line(q: Reading, nx: float, ny: float, away: float) -> tuple[float, float, float]:
     """Return half the way over a line to the listener, and its derivatives by both sensors' distances from it.
 
-    `q`: a reading; of an echo this is the distance itself, by which the derivative is 1, and 0. `nx`, `ny`: the
-    line's unit normal, away from the sensors. `away`: the transmitter's distance before the line, m.
+    Parameters
+    ----------
+    q : Reading
+        A reading; of an echo this is the distance itself, by which the derivative is 1, and 0.
+    nx, ny : float
+        The line's unit normal, away from the sensors.
+    away : float
+        The transmitter's distance before the line, m.
     """
     if not is_crossed(q):
         return away, 1.0, 0.0

@@ -142,7 +142,10 @@ def apply_config(p: SettingsRecord, config: BayesConfig) -> None:
 def apply_library(p: SettingsRecord, models: Sequence[ModelConfig]) -> None:
     """Write the models: round ones by their radius, others by their outline.
 
-    Raises `ValueError`: there are more models than the record holds.
+    Raises
+    ------
+    ValueError
+        There are more models than the record holds.
     """
     known, _ = circle_models(models)
     rivals = [r for r in RIVAL_RADII_M if all(abs(r - k) > RIVAL_APART_M for k in known)]
@@ -174,9 +177,19 @@ def copied(p: SettingsRecord) -> SettingsRecord:
 def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: BayesConfig) -> SettingsRecord:
     """Return the settings for a ring, a library and a configuration.
 
-    `ring`: beam, resolution and range. `models`: the library: round ones by their radius, the others by their
-    outline. `config`: the settings that a user may change.
-    Raises `ValueError`: there are more models than the record holds.
+    Parameters
+    ----------
+    ring : RingConfig
+        Beam, resolution and range.
+    models : sequence of ModelConfig
+        The library: round ones by their radius, the others by their outline.
+    config : BayesConfig
+        The settings that a user may change.
+
+    Raises
+    ------
+    ValueError
+        There are more models than the record holds.
     """
     p = records(Settings, zeros(Settings, 1))
     half_angle = math.radians(ring.beam_half_angle_deg)

@@ -95,8 +95,14 @@ def build_table(
 def log_likelihood(p: Records[Settings], level: int, error: float) -> float:
     """Return the log likelihood ratio (nat) of a range error at a noise level, interpolated in the table.
 
-    `p`, shape (1,): the table. `level`: noise level: the table's row. `error`: measured range less predicted range,
-    m.
+    Parameters
+    ----------
+    p : (1,) Settings
+        The table.
+    level : int
+        Noise level: the table's row.
+    error : float
+        Measured range less predicted range, m.
     """
     t = min(abs(error) * p[0].table_bins_per_m[level], float(TABLE_BINS - 2))
     b = int(t)
@@ -108,7 +114,14 @@ def log_likelihood(p: Records[Settings], level: int, error: float) -> float:
 def level_of(p: Records[Settings], noise: int, range_m: float) -> int:
     """Return the table's noise level for a noise hypothesis at a range.
 
-    `p`, shape (1,): the noise hypotheses. `noise`: index of the hypothesis. `range_m`: range, m.
+    Parameters
+    ----------
+    p : (1,) Settings
+        The noise hypotheses.
+    noise : int
+        Index of the hypothesis.
+    range_m : float
+        Range, m.
     """
     return int(p[0].noises[noise].levels[min(int(range_m * RANGE_BINS_PER_M), RANGE_BINS - 1)])
 
@@ -117,8 +130,12 @@ def level_of(p: Records[Settings], noise: int, range_m: float) -> int:
 def build_levels(noises: Records[NoiseModel], sigmas: Floats) -> None:
     """Write each noise hypothesis' table level at the middle of each range bin.
 
-    `noises`, shape (NOISES,): hypotheses; their `levels` are written. `sigmas`, shape (TABLE_LEVELS,): noise of each
-    level, m, spaced geometrically.
+    Parameters
+    ----------
+    noises : (NOISES,) NoiseModel
+        Hypotheses; their `levels` are written.
+    sigmas : (TABLE_LEVELS,) float
+        Noise of each level, m, spaced geometrically.
     """
     last = TABLE_LEVELS - 1
     ratio = math.log(sigmas[last] / sigmas[0]) / last

@@ -47,7 +47,12 @@ from perception.shared_numbers import FAR, OUTLIER_SIGMAS
 def off_and_along(line: Line, x: float, y: float) -> tuple[float, float]:
     """Return a point's distance before a line, and the position of its foot along the line, m.
 
-    `x`, `y`: the point, m.
+    Parameters
+    ----------
+    line : Line
+        The line.
+    x, y : float
+        The point, m.
     """
     dx = x - line.origin_x
     dy = y - line.origin_y
@@ -58,7 +63,14 @@ def off_and_along(line: Line, x: float, y: float) -> tuple[float, float]:
 def reaches(line: Line, along: float, beyond: float) -> bool:
     """Return whether a position along a line lies between its ends, or at most `beyond` outside them.
 
-    `along`: position along the line, m. `beyond`: distance allowed beyond either end, m.
+    Parameters
+    ----------
+    line : Line
+        The line.
+    along : float
+        Position along the line, m.
+    beyond : float
+        Distance allowed beyond either end, m.
     """
     return bool(line.low - beyond < along < line.high + beyond)
 
@@ -73,7 +85,10 @@ def is_sure_line(line: Line) -> bool:
 def is_in_wall(s: StateRecord, x: float, y: float, radius: float) -> bool:
     """Return whether a circle's centre lies in a known wall, or just before or behind it.
 
-    `s`, `x`, `y`, `radius`: memory, and the circle, m.
+    Parameters
+    ----------
+    s, x, y, radius
+        Memory, and the circle, m.
     """
     for k in range(MAX_LINES):
         line = s[0].lines[k]
@@ -91,7 +106,14 @@ def is_in_wall(s: StateRecord, x: float, y: float, radius: float) -> bool:
 def enter_line(s: StateRecord, fit: LineFit, ox: float, oy: float, score: LineScore) -> None:
     """Add a fitted line about the origin (ox, oy), unless it is known; replace the least credible line if full.
 
-    `s`, shape (1,): updated. `fit`, `ox`, `oy`: the line and its origin, m. `score`: its extent and its hits.
+    Parameters
+    ----------
+    s : (1,) State
+        Updated.
+    fit, ox, oy
+        The line and its origin, m.
+    score : LineScore
+        Its extent and its hits.
     """
     nx, ny, c = fit.normal_x, fit.normal_y, fit.distance
     best = -1
@@ -129,8 +151,14 @@ def enter_line(s: StateRecord, fit: LineFit, ox: float, oy: float, score: LineSc
 def correct_line(line: Line, px: float, py: float, e: float, var: float) -> None:
     """Correct a line by one range, by an extended Kalman filter on its angle and distance.
 
-    `line`: updated. `px`, `py`: the sensor's place about the line's origin, m. `e`, `var`: range heard less predicted
-    (m) and its variance (m²).
+    Parameters
+    ----------
+    line : Line
+        Updated.
+    px, py : float
+        The sensor's place about the line's origin, m.
+    e, var : float
+        Range heard less predicted (m) and its variance (m²).
     """
     lever = line.normal_y * px - line.normal_x * py
     line.variance_angle += LINE_ANGLE_DRIFT_RAD2
@@ -166,8 +194,14 @@ def at_beam_edge(
 ) -> tuple[float, float]:
     """Return the range of a slanting wall, of which a cone's nearest point lies on the beam's edge, and its place.
 
-    `line`, `q`, `p`: the wall's line, the reading and the settings. `dot`: cosine of the angle between the line's
-    normal and the sensor's axis. `foot`, `expected`: place of the sensor's foot along the line, and its distance, m.
+    Parameters
+    ----------
+    line, q, p
+        The wall's line, the reading and the settings.
+    dot : float
+        Cosine of the angle between the line's normal and the sensor's axis.
+    foot, expected : float
+        Place of the sensor's foot along the line, and its distance, m.
     """
     off = math.acos(min(1.0, dot)) - p[0].half_angle_rad
     side = 1.0 if line.normal_x * q.axis_y - line.normal_y * q.axis_x < 0.0 else -1.0

@@ -30,7 +30,13 @@ def is_elsewhere(track: CircleTrack, p: Records[Settings], cx: float, cy: float,
 
     Bodies do not overlap, and a rival that all but touches a model is a part of the body that the model stands for:
     an edge of the box that was taken for a drum. It takes no readings from the model, which has to explain them.
-    `cx`, `cy`, `radius`: the circle, m.
+
+    Parameters
+    ----------
+    track, p
+        The track and the settings.
+    cx, cy, radius : float
+        The circle, m.
     """
     apart: float = p[0].merge_m
     if track.kind >= p[0].model_count:
@@ -92,8 +98,14 @@ def is_behind_body(
 ) -> bool:
     """Return whether another circle lies between (x, y) and a circle about (cx, cy).
 
-    `others`, shape (k,): the established circles but for this one. `x`, `y`: the sensor's position, m. `cx`, `cy`,
-    `d`, `radius`: the circle, and the distance of its centre, m.
+    Parameters
+    ----------
+    others : (k,) OtherCircle
+        The established circles but for this one.
+    x, y : float
+        The sensor's position, m.
+    cx, cy, d, radius : float
+        The circle, and the distance of its centre, m.
     """
     ux = (cx - x) / d
     uy = (cy - y) / d
@@ -154,7 +166,11 @@ def answers_before(others: Records[OtherCircle], p: Records[Settings], q: Readin
 
     A listener reports the first pulse to arrive. Beams that are wide enough for listening look past bodies at places
     from which nothing can be heard, and what a strayed pulse seems to show there nothing would contradict.
-    `others`, `p`, `q`: as for `is_explained_elsewhere`.
+
+    Parameters
+    ----------
+    others, p, q
+        As for `is_explained_elsewhere`.
     """
     apart = math.sqrt(q.listener_x * q.listener_x + q.listener_y * q.listener_y)
     for i in range(len(others)):

@@ -27,7 +27,12 @@ Y_PRIME: Final = 19349663
 def bucket_index(cell_x: int, cell_y: int, buckets: int) -> int:
     """Return the index of a grid cell's bucket: the cell's spatial hash (Teschner et al. 2003, §3).
 
-    `cell_x`, `cell_y`: indices of the cell. `buckets`: number of buckets, a power of two.
+    Parameters
+    ----------
+    cell_x, cell_y : int
+        Indices of the cell.
+    buckets : int
+        Number of buckets, a power of two.
     """
     return ((cell_x * X_PRIME) ^ (cell_y * Y_PRIME)) & (buckets - 1)
 
@@ -76,8 +81,14 @@ def segments_near(
 ) -> int:
     """Copy the places and normals of the segments whose middles lie within a circle; return how many.
 
-    `buckets`, `cell_m`: as for `add_to_map`. `x`, `y`, `radius`: the circle, m. `found`, shape (m,): out: middle and
-    normal. What does not fit is left out.
+    Parameters
+    ----------
+    buckets, cell_m
+        As for `add_to_map`.
+    x, y, radius : float
+        The circle, m.
+    found : (m,) MappedSegment
+        Out: middle and normal. What does not fit is left out.
     """
     n = 0
     for cell_x in range(math.floor((x - radius) / cell_m), math.floor((x + radius) / cell_m) + 1):
@@ -113,7 +124,12 @@ def enter_attracting(segment: MappedSegment, row: Floats) -> None:
 def set_hypothesis(s: StateRecord, x: float, y: float, heading: float) -> None:
     """Set the scratch's hypothesis to a pose.
 
-    `s`, shape (1,): memory; its scratch is updated. `x`, `y`, `heading`: the pose, m, rad.
+    Parameters
+    ----------
+    s : (1,) State
+        Memory; its scratch is updated.
+    x, y, heading : float
+        The pose, m, rad.
     """
     hypothesis = s[0].scratch.hypothesis
     hypothesis.x = x

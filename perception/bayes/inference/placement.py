@@ -38,7 +38,15 @@ def says_new(sensor: Sensor, range_m: float, tolerance: float) -> bool:
     sensor ever moved, nothing else is known: the first, second, fourth and eighth count, whatever they read. If those
     that repeat the last range were left out instead, ranges that vary by a count would outnumber silences, and the
     surroundings would seem to answer at any angle.
-    `sensor`: updated. `range_m`: the range, m. `tolerance`: greatest difference between two ranges of one surface, m.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Updated.
+    range_m : float
+        The range, m.
+    tolerance : float
+        Greatest difference between two ranges of one surface, m.
     """
     sensor.looks += 1
     sensor.changed = sensor.changed + 1 if abs(range_m - sensor.last.range_m) > tolerance else 0
@@ -57,7 +65,11 @@ def place_readings(
     An invalid pose or range is left out, because it would corrupt every sum. So is the least range that the ring can
     report: whatever is nearer reads so, by up to a decimetre too far, and drums that were passed closely lost their
     names.
-    `s`, `p`, `mounts`, `px`, `py`, `yaw`, `ranges`: as for `associate`.
+
+    Parameters
+    ----------
+    s, p, mounts, px, py, yaw, ranges
+        As for `associate`.
     """
     s[0].scratch.crosses = 0
     if not (abs(px) < COORDINATE_MAX_M and abs(py) < COORDINATE_MAX_M and math.isfinite(yaw)):

@@ -90,8 +90,14 @@ def predict_any(
 def predict_circle(readings: Records[Reading], x: float, y: float, radius: float, out: Predictions) -> None:
     """Write what a circle predicts of readings. An echo before all cross paths takes a sixth of the time of one.
 
-    `readings`, shape (n,): raw ranges. `x`, `y`, `radius`: centre and radius, m. `out`: its first n are written, for
-    the rays it gives.
+    Parameters
+    ----------
+    readings : (n,) Reading
+        Raw ranges.
+    x, y, radius : float
+        Centre and radius, m.
+    out : Predictions
+        Its first n are written, for the rays it gives.
     """
     k = leading_echoes(readings)
     if out.rays > 0:

@@ -43,7 +43,13 @@ def robust_weight(e: float, var: float, soft: float) -> float:
     """Return the Geman–McClure weight of a residual, 1/m²: its information, reduced for large residuals.
 
     1 / (v (1 + e²/(s v))²) is the Geman–McClure weight, with s the number of σ² at which it has fallen to a quarter.
-    `e`, `var`: residual (m) and its variance v (m²). `soft`: s.
+
+    Parameters
+    ----------
+    e, var : float
+        Residual (m) and its variance v (m²).
+    soft : float
+        s.
     """
     q = 1.0 / (1.0 + e * e / (soft * var))
     return q * q / var
@@ -320,8 +326,14 @@ def score_line(
 ) -> None:
     """Score readings for a line, as `score_circle`; silence counts only between the feet of the line's own hits.
 
-    `readings`, `p`, `noise`: as for `score_circle`. `line`, `ox`, `oy`: the line n·(p − o) = c: unit normal and
-    distance (m), and the origin o (m). `score`: out; the extent is along (−ny, nx) from o.
+    Parameters
+    ----------
+    readings, p, noise
+        As for `score_circle`.
+    line, ox, oy
+        The line n·(p − o) = c: unit normal and distance (m), and the origin o (m).
+    score : LineScore
+        Out; the extent is along (−ny, nx) from o.
     """
     cos_may, cos_half, cos_must = p[0].cos_may_answer, p[0].cos_half_angle, p[0].cos_must_answer
     gate, missed = p[0].gate_m, p[0].missed_echo_nat

@@ -153,7 +153,13 @@ def gather_history(s: Records[State], p: Records[Settings], cx: float, cy: float
     """Copy the remembered readings that bear on a circle, hits and silences, to the scratch; return their number.
 
     It is heard as the scratch's `predicted` says.
-    `s`, `p`: memory, whose scratch is updated, and settings. `cx`, `cy`, `radius`: the circle, m.
+
+    Parameters
+    ----------
+    s, p
+        Memory, whose scratch is updated, and settings.
+    cx, cy, radius : float
+        The circle, m.
     """
     readings = s[0].scratch.readings
     cos_may, range_max = p[0].cos_may_answer, p[0].range_max_m

@@ -74,8 +74,12 @@ def drop_track(track: AnyTrack) -> bool:
 def outlives(track: AnyTrack, other: AnyTrack, has_more: bool) -> bool:
     """Return whether the first of two tracks in one place stays; the one that stays gets the older number.
 
-    `track`, `other`: the tracks, updated. One that a user marked stays, and keeps its number. `has_more`: whether the
-    first has more evidence.
+    Parameters
+    ----------
+    track, other
+        The tracks, updated. One that a user marked stays, and keeps its number.
+    has_more : bool
+        Whether the first has more evidence.
     """
     if (track.marks != 0) != (other.marks != 0):
         return track.marks != 0
@@ -150,7 +154,14 @@ def is_rejected(s: StateRecord, x: float, y: float, what: int, evidence_nat: flo
 def may_become(s: StateRecord, track: CircleTrack, k: int, evidence_nat: float) -> bool:
     """Return whether a track may become another circle: neither a user's mark nor a rejection prevents it.
 
-    `s`, `track`: memory, in whose scratch the other circle is fitted, and the track. `k`: index of the other circle.
+    Parameters
+    ----------
+    s, track
+        Memory, in whose scratch the other circle is fitted, and the track.
+    k : int
+        Index of the other circle.
+    evidence_nat : float
+        Its evidence.
     """
     fit = s[0].scratch.circle_fit
     return track.marks == 0 and not is_rejected(s, fit.x, fit.y, k, evidence_nat)

@@ -26,8 +26,14 @@ def radii_of(p: SettingsRecord) -> Floats:
 def migrate(memory: Memory, archived: Structured, before: SettingsRecord, after: SettingsRecord) -> None:
     """Move values indexed by explanation to the indices of other settings.
 
-    `memory`: updated. `archived`, shape (n,): archived circles; updated. `before`, `after`, shape (1,): of the models
-    in `after` the polygons of `before` are the first.
+    Parameters
+    ----------
+    memory : Memory
+        Updated.
+    archived : (n,) record of `archived_tracks.archived_dtype`
+        Archived circles; updated.
+    before, after : (1,) Settings
+        Of the models in `after` the polygons of `before` are the first.
     """
     old, new = radii_of(before), radii_of(after)
     index = np.abs(new[None] - old[:, None]).argmin(axis=1)

@@ -81,7 +81,13 @@ def evidence_of_circles(s: StateRecord, p: SettingsRecord, track: PolygonTrack) 
 
     An edge, a post or a drum seen from a few places looks like a polygon's corner, and the circle track in that place
     may have ended. So circles are scored on the same readings that support the polygon.
-    `s`, `p`: memory and settings. `track`: the polygon in whose place circles are fitted.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : PolygonTrack
+        The polygon in whose place circles are fitted.
     """
     scratch = s[0].scratch
     readings = s[0].job_readings[: s[0].job.reading_count]

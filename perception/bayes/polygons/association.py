@@ -26,7 +26,12 @@ def range_error(
 ) -> float:
     """Return a reading's least absolute error against the polygon's mirror and cone predictions, m.
 
-    `q`, `track`: the reading and the body. `sides`, `is_closed`, `p`: as for `likelihood.predict`.
+    Parameters
+    ----------
+    q, track
+        The reading and the body.
+    sides, is_closed, p
+        As for `likelihood.predict`.
     """
     c = math.cos(track.heading)
     sn = math.sin(track.heading)
@@ -51,7 +56,12 @@ def range_error(
 def associate_polygons(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int) -> None:
     """Associate fired readings with the established polygons that explain them, and fill the polygons' reservoirs.
 
-    `s`, `tracks`, `p`: memory, updated, circles and settings. `m`: echoes; the cross paths follow them.
+    Parameters
+    ----------
+    s, tracks, p
+        Memory, updated, circles and settings.
+    m : int
+        Echoes; the cross paths follow them.
     """
     var0, _ = noise_variance(s, p)
     tight = tolerance_m(p[0].half_resolution_m, var0)
@@ -84,7 +94,12 @@ def associate_polygons(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, 
 def hides(q: Reading, track: PolygonTrack, inner: float, other: PolygonTrack, other_inner: float) -> bool:
     """Return whether another body stands between a reading's sensor and a track.
 
-    `q`, `track`, `other`: the reading, the track and the other body. `inner`, `other_inner`: their inner radii, m.
+    Parameters
+    ----------
+    q, track, other
+        The reading, the track and the other body.
+    inner, other_inner : float
+        Their inner radii, m.
     """
     dx = track.x - q.x
     dy = track.y - q.y

@@ -56,9 +56,20 @@ def predict_cross(
 
     A side is a mirror between two points on the same face of it, where the way meets the side; else the corner with
     the shortest way scatters. As a cone each side also answers where the transmitter's beam ends on it.
-    `q`: a cross path. `x`, `y`, `c`, `s`: the polygon's place (m), and cosine and sine of its heading. `sides`,
-    `is_closed`, `p`: as for `likelihood.predict`.
-    Returned: half the way over a mirror (m, `NO_ANSWER_M` where none), its price (nat), and that over a cone (m).
+
+    Parameters
+    ----------
+    q : Reading
+        A cross path.
+    x, y, c, s : float
+        The polygon's place (m), and cosine and sine of its heading.
+    sides, is_closed, p
+        As for `likelihood.predict`.
+
+    Returns
+    -------
+    (float, float, float)
+        Half the way over a mirror (m, `NO_ANSWER_M` where none), its price (nat), and that over a cone (m).
     """
     dx, dy = q.x - x, q.y - y
     tx, ty = c * dx + s * dy, c * dy - s * dx
@@ -127,8 +138,13 @@ def score_crosses(
     """Return evidence (nat), near readings and hits of the cross paths, as a mirror, and then as a cone.
 
     A cross path is never bound to be heard; so it counts only for a body.
-    `readings`, `every`, `sides`, `is_closed`, `p`, `noise`: as for `likelihood.score_polygon`. `frame`: x, y, c, s,
-    as for `predict_cross`.
+
+    Parameters
+    ----------
+    readings, every, sides, is_closed, p, noise
+        As for `likelihood.score_polygon`.
+    frame : (float, float, float, float)
+        x, y, c, s, as for `predict_cross`.
     """
     x, y, c, s = frame
     gate = p[0].gate_m

@@ -66,7 +66,11 @@ def gather_job_readings(s: StateRecord, p: SettingsRecord, model: int, cx: float
     """Copy the remembered readings that bear on a polygon at (cx, cy) to the job; return their number.
 
     Readings beyond the job's capacity are dropped at even spacing, because one sensor's readings follow another's.
-    `s`, `p`, `model`, `cx`, `cy`: as for `gather_polygon_history`.
+
+    Parameters
+    ----------
+    s, p, model, cx, cy
+        As for `gather_polygon_history`.
     """
     n = gather_polygon_history(s, p, model, cx, cy)
     kept = min(n, len(s[0].job_readings))
@@ -79,7 +83,12 @@ def gather_job_readings(s: StateRecord, p: SettingsRecord, model: int, cx: float
 def occupant(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float) -> int:
     """Return the index of the track of the same model that stands at (x, y); −1 without one.
 
-    `s`, `p`, `model`: memory, settings, and index of the polygon. `x`, `y`: m.
+    Parameters
+    ----------
+    s, p, model
+        Memory, settings, and index of the polygon.
+    x, y : float
+        m.
     """
     for t in range(MAX_POLYGONS):
         track = s[0].polygons[t]
@@ -152,8 +161,14 @@ def lay_side(
 def start_polygon(s: StateRecord, model: int, x: float, y: float, heading: float, evidence_nat: float) -> None:
     """Start a tentative track on the job's readings, if a track is free.
 
-    `s`, `model`: memory (updated), and index of the polygon. `x`, `y`, `heading`: its pose, m, rad. `evidence_nat`:
-    its log ratio.
+    Parameters
+    ----------
+    s, model
+        Memory (updated), and index of the polygon.
+    x, y, heading : float
+        Its pose, m, rad.
+    evidence_nat : float
+        Its log ratio.
     """
     t = free_track(s[0].polygons)
     if t >= 0:
@@ -188,8 +203,14 @@ def restart_polygon(
 ) -> None:
     """Set a track to a tentative one on the given readings.
 
-    `track`: updated, except its number and its marks. `model`, `x`, `y`, `heading`: which polygon, and its pose, m,
-    rad. `readings`, shape (n,): raw ranges.
+    Parameters
+    ----------
+    track : PolygonTrack
+        Updated, except its number and its marks.
+    model, x, y, heading
+        Which polygon, and its pose, m, rad.
+    readings : (n,) Reading
+        Raw ranges.
     """
     reset_polygon(track)
     track.status = TENTATIVE
@@ -206,7 +227,10 @@ def restart_polygon(
 def challenge(s: StateRecord, t: int, x: float, y: float, heading: float) -> None:
     """Give a track another pose to try on its own readings: its place is right, but its pose may be wrong.
 
-    `s`, `t`, `x`, `y`, `heading`: memory (updated), the track, and the other pose, m, rad.
+    Parameters
+    ----------
+    s, t, x, y, heading
+        Memory (updated), the track, and the other pose, m, rad.
     """
     track = s[0].polygons[t]
     track.has_challenger = 1
@@ -220,8 +244,12 @@ def challenge(s: StateRecord, t: int, x: float, y: float, heading: float) -> Non
 def request_polygon(s: StateRecord, model: int, x: float, y: float, nx: float, ny: float) -> int:
     """Queue a polygon hypothesis behind a segment; return 1, or 0 where the same was requested recently.
 
-    `s`, `model`: memory (updated), and index of the polygon. `x`, `y`, `nx`, `ny`: the segment's middle (m) and unit
-    normal, away from the sensors.
+    Parameters
+    ----------
+    s, model
+        Memory (updated), and index of the polygon.
+    x, y, nx, ny : float
+        The segment's middle (m) and unit normal, away from the sensors.
     """
     job = s[0].job
     for k in range(min(job.requests_made, REQUESTS_MAX)):
@@ -310,7 +338,10 @@ def lay_next(s: StateRecord, p: SettingsRecord) -> int:
 def advance_initiation(s: StateRecord, p: SettingsRecord, left: int) -> int:
     """Continue a hypothesis for the rest of a quantum; return the cost.
 
-    `s`, `p`, `left`: memory (updated), settings, and what is left of the quantum.
+    Parameters
+    ----------
+    s, p, left
+        Memory (updated), settings, and what is left of the quantum.
     """
     job = s[0].job
     model = job.model

@@ -21,8 +21,14 @@ from perception.kernel import kernel
 def cost(readings: int, every: int, sides: int) -> int:
     """Return the cost of scoring one pose, in the unit of `QUANTUM_COST`.
 
-    `readings`: number of readings. `every`: step from one scored reading to the next. `sides`: number of the model's
-    sides.
+    Parameters
+    ----------
+    readings : int
+        Number of readings.
+    every : int
+        Step from one scored reading to the next.
+    sides : int
+        Number of the model's sides.
     """
     return (readings + every - 1) // every * (READING_COST + sides)
 
@@ -39,8 +45,14 @@ def copy_pose(source: Pose, target: Pose) -> None:
 def start_search(s: StateRecord, x: float, y: float, heading: float, step_m: float, rounds: int, most: int) -> None:
     """Begin a pose search on at most `most` of the job's readings.
 
-    `s`, shape (1,): memory, updated. `x`, `y`, `heading`, `step_m`, `rounds`: as for `likelihood.begin_search`.
-    `most`: readings.
+    Parameters
+    ----------
+    s : (1,) State
+        Memory, updated.
+    x, y, heading, step_m, rounds
+        As for `likelihood.begin_search`.
+    most : int
+        Readings.
     """
     job = s[0].job
     begin_search(job.search, x, y, heading, step_m, rounds)
@@ -57,7 +69,14 @@ def is_search_over(s: StateRecord) -> bool:
 def advance_search(s: StateRecord, p: SettingsRecord, model: int, left: int) -> int:
     """Continue the job's search for the rest of a quantum, at least one pose; return the cost.
 
-    `s`, `p`: memory, updated, and settings. `model`: which polygon. `left`: what is left of the quantum.
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    model : int
+        Which polygon.
+    left : int
+        What is left of the quantum.
     """
     job = s[0].job
     outline = p[0].polygons[model]
@@ -91,7 +110,12 @@ def keep_best(s: StateRecord) -> None:
 def score_pose(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float, heading: float) -> float:
     """Return the log ratio (nat) of all the job's readings at a pose; write the scratch's score.
 
-    `s`, `p`, `model`: as for `advance_search`. `x`, `y`, `heading`: the pose, m, rad.
+    Parameters
+    ----------
+    s, p, model
+        As for `advance_search`.
+    x, y, heading : float
+        The pose, m, rad.
     """
     outline = p[0].polygons[model]
     return score_polygon(

@@ -35,8 +35,14 @@ from perception.records import Records
 def is_met(towards: float, sideways: float, along: float, height: float, length: float) -> bool:
     """Return whether a direction of a beam meets a side.
 
-    `towards`, `sideways`: the direction, a unit vector: towards the side's line, and along it. `along`, `height`:
-    where the sensor is along the side, and how far from its line, m. `length`: of the side, m.
+    Parameters
+    ----------
+    towards, sideways : float
+        The direction, a unit vector: towards the side's line, and along it.
+    along, height : float
+        Where the sensor is along the side, and how far from its line, m.
+    length : float
+        Of the side, m.
     """
     return towards > GRAZING_COS and 0.0 <= along * towards + height * sideways <= length * towards
 
@@ -163,8 +169,14 @@ def range_nat(r: float, at: float, must: bool, price: float, p: SettingsRecord, 
 def counts_of(v: float, r: float, at: float, must: bool, gate: float) -> tuple[float, float, float, float]:
     """Return whether a range is near the predicted one, a hit, a sure hit, and a drop-out, 1 or 0 each.
 
-    `v`: what the range says, as of `range_nat`, nat. `r`, `at`, `must`: as for `range_nat`. `gate`: how far off a
-    near range may be, m.
+    Parameters
+    ----------
+    v : float
+        What the range says, as of `range_nat`, nat.
+    r, at, must
+        As for `range_nat`.
+    gate : float
+        How far off a near range may be, m.
     """
     if abs(r - at) < gate:
         hit = 1.0 if v > 0.0 else 0.0
@@ -280,7 +292,12 @@ def score_polygon(
 def moved(x: float, y: float, heading: float, axis: int, step: float) -> tuple[float, float, float]:
     """Return a pose moved along or across the body, or turned.
 
-    `x`, `y`, `heading`: the pose, m, rad. `axis`, `step`: `ALONG`, `ACROSS` or `TURN`, and by how much, m or rad.
+    Parameters
+    ----------
+    x, y, heading : float
+        The pose, m, rad.
+    axis, step
+        `ALONG`, `ACROSS` or `TURN`, and by how much, m or rad.
     """
     if axis == ALONG:
         return x + step * math.cos(heading), y + step * math.sin(heading), heading
@@ -331,8 +348,15 @@ def continue_search(
     The likelihood has steps where sides begin and cease to answer, so no derivative is used: a coordinate search
     tries each of the body's axes both ways, and shrinks the steps when none gains. A search stops when its budget is
     spent and continues from there; it is over when no round is left.
-    `search`: from `begin_search`; updated. `allowed`: poses to score at most. `readings`, `every`, `sides`,
-    `is_closed`, `p`, `noise`, `score`: as for `score_polygon`; `score` is scratch.
+
+    Parameters
+    ----------
+    search : PoseSearch
+        From `begin_search`; updated.
+    allowed : int
+        Poses to score at most.
+    readings, every, sides, is_closed, p, noise, score
+        As for `score_polygon`; `score` is scratch.
     """
     scored = 0
     while scored < allowed and search.rounds_left > 0:

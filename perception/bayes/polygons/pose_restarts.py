@@ -104,8 +104,14 @@ def facing_side(s: StateRecord, sides: Records[PolygonSide], is_closed: bool) ->
 def roll(s: StateRecord, p: SettingsRecord, model: int, k: int) -> bool:
     """Roll the pose at the job's middle onto its `k`-th other side; return whether there is such a side.
 
-    `s`, `p`: memory, whose scratch takes the pose as its `hypothesis`, and settings. `model`: which polygon. `k`:
-    from 1 on.
+    Parameters
+    ----------
+    s, p
+        Memory, whose scratch takes the pose as its `hypothesis`, and settings.
+    model : int
+        Which polygon.
+    k : int
+        From 1 on.
     """
     middle = s[0].job.middle
     outline = p[0].polygons[model]

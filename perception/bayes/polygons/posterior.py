@@ -53,7 +53,12 @@ THINNEST: Final = LATTICE_THINNEST * CUT
 def clip(v: float, low: float, high: float) -> float:
     """Return a value limited to an interval.
 
-    `v`: the value. `low`, `high`: the interval's bounds.
+    Parameters
+    ----------
+    v : float
+        The value.
+    low, high : float
+        The interval's bounds.
     """
     return min(max(v, low), high)
 
@@ -107,8 +112,14 @@ def clear_moments(moments: LatticeMoments) -> None:
 def score_lattice(s: StateRecord, p: SettingsRecord, model: int, begin: int, end: int) -> None:
     """Add the likelihood at some of the lattice's points to the job's moments.
 
-    `s`, `p`: memory, updated, and settings. `model`: which polygon. `begin`, `end`: first point and end of the
-    points: rows of `LATTICE`.
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    model : int
+        Which polygon.
+    begin, end : int
+        First point and end of the points: rows of `LATTICE`.
     """
     job = s[0].job
     middle, root, moments = job.middle, job.root, job.moments
@@ -202,7 +213,12 @@ def leave_frame(pose: Pose, root: LowerTriangle, moments: LatticeMoments, cov: L
 def lay_lattice(s: StateRecord, p: SettingsRecord, model: int) -> None:
     """Lay the job's lattice round its middle, with the pitch of its expected covariance.
 
-    `s`, `p`: memory, updated, and settings. `model`: index of the polygon.
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    model : int
+        Index of the polygon.
     """
     job = s[0].job
     write_pitch(job.covariance, job.root)
@@ -215,8 +231,15 @@ def lay_lattice(s: StateRecord, p: SettingsRecord, model: int) -> None:
 def begin_lattice(s: StateRecord, p: SettingsRecord, model: int, t: int) -> None:
     """Begin the computation of mean and covariance of a polygon's pose.
 
-    `s`, `p`: memory, updated, and settings. `model`: which polygon. `t`: its track, near the job's best pose, the
-    first middle; where its covariance is zero, the first lattice uses default deviations.
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    model : int
+        Which polygon.
+    t : int
+        Its track, near the job's best pose, the first middle; where its covariance is zero, the first lattice uses
+        default deviations.
     """
     job = s[0].job
     track = s[0].polygons[t]
@@ -240,7 +263,15 @@ def advance_lattice(s: StateRecord, p: SettingsRecord, model: int, left: int) ->
     Where the mass of a scored lattice is off the middle, or not about as wide as expected, the frame moves to it
     and the lattice is laid again, `LATTICE_ATTEMPTS` times at most. The job's `lattices` is `LATTICE_ATTEMPTS` when
     all is done; mean and covariance are then its `middle` and `covariance`.
-    `s`, `p`: memory, updated, and settings. `model`: which polygon. `left`: what is left of the quantum.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    model : int
+        Which polygon.
+    left : int
+        What is left of the quantum.
     """
     job = s[0].job
     moments = job.moments

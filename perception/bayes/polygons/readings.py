@@ -16,8 +16,15 @@ from perception.kernel import kernel
 def bears_on_polygon(q: Reading, cx: float, cy: float, bound: float, p: SettingsRecord) -> bool:
     """Return whether a reading is evidence for or against a body within a circle.
 
-    `cx`, `cy`, `bound`: centre and radius of the circle, m. `p`, shape (1,): the beam; a range that ends farther than
-    the gate before the circle is not evidence, nor is one of a sensor farther off than `pair_range_max_m`.
+    Parameters
+    ----------
+    q : Reading
+        The reading.
+    cx, cy, bound : float
+        Centre and radius of the circle, m.
+    p : (1,) Settings
+        The beam; a range that ends farther than the gate before the circle is not evidence, nor is one of a sensor
+        farther off than `pair_range_max_m`.
     """
     reach = p[0].pair_range_max_m
     dx = cx - q.x
@@ -38,7 +45,14 @@ def bears_on_polygon(q: Reading, cx: float, cy: float, bound: float, p: Settings
 def gather_polygon_history(s: StateRecord, p: SettingsRecord, model: int, cx: float, cy: float) -> int:
     """Copy the remembered readings that bear on a polygon at (cx, cy) to the scratch; return their number.
 
-    `s`, `p`: memory and settings. `model`: which polygon. `cx`, `cy`: m.
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    model : int
+        Which polygon.
+    cx, cy : float
+        m.
     """
     readings = s[0].scratch.readings
     bound = p[0].polygons[model].outer_radius_m

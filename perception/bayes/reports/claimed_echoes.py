@@ -24,8 +24,14 @@ from perception.shared_numbers import FAR
 def own_echoes(circles: Structured, surfaces: Floats, memory: Memory, p: SettingsRecord) -> Ints:
     """Return how many of the echoes that each circle explains no surface does, shape (k,).
 
-    `circles`, shape (k,): the circles. `surfaces`, shape (n, 4): the ends x, y, x, y of walls that are sure, m; a
-    corner has both in one place. `memory`, `p`: the noise and whether walls are mirrors, and the settings.
+    Parameters
+    ----------
+    circles : (k,) record of `CircleTrack`
+        The circles.
+    surfaces : (n, 4) float
+        The ends x, y, x, y of walls that are sure, m; a corner has both in one place.
+    memory, p
+        The noise and whether walls are mirrors, and the settings.
     """
     bins = circles["bins"]
     kept = np.arange(bins["readings"].shape[-1]) < bins["count"][..., None]

@@ -83,7 +83,10 @@ def polygon_evidence(
 ) -> int:
     """Write the evidence of each reading for polygon `t`, 0 where it does not bear on it; return how many there are.
 
-    `s`, `p`, `t`, `readings`, `score`, `nats`: as for `circle_evidence`.
+    Parameters
+    ----------
+    s, p, t, readings, score, nats
+        As for `circle_evidence`.
     """
     track = s[0].polygons[t]
     outline = p[0].polygons[track.model]

@@ -54,8 +54,14 @@ Row = tuple[float, ...]
 def circle_object(row: Row, label: str, probability: float) -> DetectedObject:
     """Return a circle track as a reported object, which has no heading.
 
-    `row`: the track's values of `CIRCLE_FIELDS`. `label`: the name it is reported by. `probability`: the probability
-    it is reported with.
+    Parameters
+    ----------
+    row : record
+        The track's values of `CIRCLE_FIELDS`.
+    label : str
+        The name it is reported by.
+    probability : float
+        The probability it is reported with.
     """
     x, y, xx, xy, yy, hits, number, marks = row
     xx, xy, yy = CIRCLE_INFLATION * xx, CIRCLE_INFLATION * xy, CIRCLE_INFLATION * yy
@@ -92,7 +98,12 @@ def polygon_covariance(track: PolygonTrack) -> Floats:
 def polygon_object(track: PolygonTrack, p: SettingsRecord, label: str, probability: float) -> DetectedObject:
     """Return a polygon track as a reported object; of its equivalent headings the least one from −π on.
 
-    `label`, `probability`: the name and probability it is reported with.
+    Parameters
+    ----------
+    track, p
+        The track and the settings.
+    label, probability
+        The name and probability it is reported with.
     """
     heading = float(track.heading)
     covariance = polygon_covariance(track)
@@ -120,7 +131,12 @@ def archived_models(
 ) -> Iterator[DetectedObject]:
     """Yield the archived objects that were reported as models, circles first.
 
-    `rounds`, `outlines`: names of the round models and of the polygons, in the order of their numbers.
+    Parameters
+    ----------
+    archive, p
+        The archive and the settings.
+    rounds, outlines : sequence of str
+        Names of the round models and of the polygons, in the order of their numbers.
     """
     circles = archive.circles.held()
     circles = circles[(circles["is_reported"] == 1) & (circles["kind"] < len(rounds))]
@@ -165,8 +181,12 @@ def corner_object(corner: Row) -> DetectedObject:
 def rival_label(memory: Memory, x: float, y: float, radius: float) -> str:
     """Return the label of a circle that is not a model.
 
-    `memory`: its walls tell a corner from an edge: an inside corner has two of them, and lies before both. `x`, `y`,
-    `radius`: the circle, m.
+    Parameters
+    ----------
+    memory : Memory
+        Its walls tell a corner from an edge: an inside corner has two of them, and lies before both.
+    x, y, radius : float
+        The circle, m.
     """
     if radius > 0.0:
         return round_label(radius)
@@ -187,7 +207,12 @@ def rival_label(memory: Memory, x: float, y: float, radius: float) -> str:
 def wall_edge(surfaces: Floats, x: float, y: float, radius: float) -> tuple[float, float] | None:
     """Return the point of a wall's line beside a thin circle at the wall's end, m; None if no wall ends there.
 
-    `surfaces`, shape (n, 4): as for `own_echoes`. `x`, `y`, `radius`: the circle, m.
+    Parameters
+    ----------
+    surfaces : (n, 4) float
+        As for `own_echoes`.
+    x, y, radius : float
+        The circle, m.
     """
     lengths = np.hypot(surfaces[:, 2] - surfaces[:, 0], surfaces[:, 3] - surfaces[:, 1])
     walls, length = surfaces[lengths > 0.0], lengths[lengths > 0.0]
@@ -206,7 +231,11 @@ def is_corner_of_mirrors(circle: Structured) -> bool:
     """Return whether most echoes of a point are from where, between mirrors, no edge is heard, and from all round.
 
     From afar the end of a wall is heard as well, but only along the wall's normal.
-    `circle`: the point.
+
+    Parameters
+    ----------
+    circle : record of `CircleTrack` or of `archived_tracks.archived_dtype`
+        The point.
     """
     if READINGS in (circle.dtype.names or ()):
         x, y, _, ranges = circle[READINGS][: int(circle["kept"])].astype(np.float64).T
@@ -235,7 +264,14 @@ def other_objects(
 ) -> list[DetectedObject]:
     """Return the objects without a model's name: walls, corners, edges, posts, barrels, and unknown objects.
 
-    `least`: least probability at which a rival gets its own label. `named`: the models.
+    Parameters
+    ----------
+    memory, p
+        Memory and settings.
+    least : float
+        Least probability at which a rival gets its own label.
+    named : sequence of DetectedObject
+        The models.
     """
     segments, points = room_report(memory)
     corners = [corner_object(point.item()) for point in points]

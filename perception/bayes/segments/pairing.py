@@ -57,7 +57,13 @@ def pair_in_time(s: StateRecord, p: SettingsRecord, i: int, time_s: float, var: 
     """Pair a reading with its own sensor's history at three baselines; return the new number of segments.
 
     A short baseline gives a segment early, a long one gives a certain direction.
-    `s`, `p`, `i`, `var`, `made`: as for `add_pair`. `time_s`: time of the firing.
+
+    Parameters
+    ----------
+    s, p, i, var, made
+        As for `add_pair`.
+    time_s : float
+        Time of the firing.
     """
     q = s[0].scratch.fired[i]
     sensor = s[0].sensors[s[0].scratch.fired_sensors[i]]
@@ -83,7 +89,12 @@ def pair_in_time(s: StateRecord, p: SettingsRecord, i: int, time_s: float, var: 
 def pair_in_ring(s: StateRecord, p: SettingsRecord, i: int, m: int, time_s: float, var: float, made: int) -> int:
     """Pair a reading with its ring neighbours' (of this firing, else the newest); return the new number of segments.
 
-    `s`, `p`, `i`, `time_s`, `var`, `made`: as for `pair_in_time`. `m`: fired readings.
+    Parameters
+    ----------
+    s, p, i, time_s, var, made
+        As for `pair_in_time`.
+    m : int
+        Fired readings.
     """
     fired, sensors = s[0].scratch.fired, s[0].scratch.fired_sensors
     q = fired[i]
@@ -112,7 +123,14 @@ def pair_in_ring(s: StateRecord, p: SettingsRecord, i: int, m: int, time_s: floa
 def map_segment(s: StateRecord, segment: PairSegment, time_s: float) -> None:
     """Put a segment into the outline map under the next segment number.
 
-    `s`, shape (1,): memory, updated. `time_s`: time of the firing, s.
+    Parameters
+    ----------
+    s : (1,) State
+        Memory, updated.
+    segment : PairSegment
+        The segment.
+    time_s : float
+        Time of the firing, s.
     """
     s[0].segments_numbered += 1
     put_segment(s, segment.x, segment.y, segment.normal_x, segment.normal_y, s[0].segments_numbered, time_s)
@@ -122,7 +140,14 @@ def map_segment(s: StateRecord, segment: PairSegment, time_s: float) -> None:
 def make_segments(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> int:
     """Pair the firing's echoes in time and in the ring, and map the segments; return the number of segments.
 
-    `s`, `p`: memory, updated, and settings. `m`: fired readings. `time_s`: time of the firing.
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    m : int
+        Fired readings.
+    time_s : float
+        Time of the firing.
     """
     var0, rel2 = noise_variance(s, p)
     scratch = s[0].scratch

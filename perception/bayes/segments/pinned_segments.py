@@ -109,7 +109,12 @@ def places_of(memory: Memory, numbers: Collection[int]) -> Ints:
 def delete(memory: Memory, pins: Pins, numbers: Collection[int]) -> set[int]:
     """Delete segments from the map; return the numbers that are not in it.
 
-    `memory`, `pins`: updated. `numbers`: the segments' numbers.
+    Parameters
+    ----------
+    memory, pins
+        Updated.
+    numbers : collection of int
+        The segments' numbers.
     """
     buckets = memory.state["buckets"][0]
     deleted = places_of(memory, numbers)
@@ -131,7 +136,13 @@ def restore(memory: Memory, pins: Pins, rows: Sequence[Sequence[float]]) -> str 
     """Put deleted segments back; return None, or why some were left out.
 
     Those that are in the map are left as they are. Where a bucket has filled since, the oldest of it give way.
-    `memory`, `pins`: updated. `rows`: as of `edits.RestoreSegments`; finite.
+
+    Parameters
+    ----------
+    memory, pins
+        Updated.
+    rows : sequence of sequence of float
+        As of `edits.RestoreSegments`; finite.
     """
     never = [row[0] for row in rows if row[0] > int(memory.state["segments_numbered"][0])]
     if never:

@@ -22,7 +22,12 @@ SHOWN_M: Final = 0.1
 def put_segment(s: StateRecord, x: float, y: float, nx: float, ny: float, number: int, time_s: float) -> None:
     """Put a segment into the outline map.
 
-    `s`, shape (1,): memory, updated. `x`, `y`, `nx`, `ny`, `number`, `time_s`: as for `outline_map.add_to_map`.
+    Parameters
+    ----------
+    s : (1,) State
+        Memory, updated.
+    x, y, nx, ny, number, time_s
+        As for `outline_map.add_to_map`.
     """
     buckets = s[0].buckets
     k = bucket_index(math.floor(x / OUTLINE_CELL_M), math.floor(y / OUTLINE_CELL_M), len(buckets))
@@ -64,7 +69,12 @@ def count_map(s: StateRecord, tracks: CircleTracks) -> tuple[int, int, int]:
 def copy_segments(s: StateRecord, out: Records[MappedSegment]) -> None:
     """Copy the segments in the map, bucket by bucket.
 
-    `s`, shape (1,): memory. `out`, shape (n,): out; as many as the map holds.
+    Parameters
+    ----------
+    s : (1,) State
+        Memory.
+    out : (n,) MappedSegment
+        Out; as many as the map holds.
     """
     n = 0
     for i in range(s[0].buckets_used):

@@ -33,7 +33,11 @@ def free_row(tracks: Structured) -> int:
     """Return a free track's row, else that of the unmarked tentative one with the least evidence, else −1.
 
     It is `track_labels.free_track` for what no kernel calls.
-    `tracks`, shape (n,): the tracks.
+
+    Parameters
+    ----------
+    tracks : (n,) record of `CircleTrack` or `PolygonTrack`
+        The tracks.
     """
     status = tracks["status"]
     free = np.flatnonzero(status == FREE)
@@ -65,7 +69,14 @@ def archived_bounds(track: type[CircleTrack | PolygonTrack]) -> Fields:
 def pack(track: Structured, dtype: np.dtype[Any], *, is_reported: bool) -> Structured:
     """Return a track as an archived record, shape (1,).
 
-    `track`, shape (1,): the track. `dtype`: from `archived_dtype`. `is_reported`: whether it is reported as a model.
+    Parameters
+    ----------
+    track : (1,) record of `CircleTrack` or `PolygonTrack`
+        The track.
+    dtype : dtype
+        From `archived_dtype`.
+    is_reported : bool
+        Whether it is reported as a model.
     """
     row = np.zeros(1, dtype)
     _copy_numbers(track, row)
@@ -81,7 +92,12 @@ def pack(track: Structured, dtype: np.dtype[Any], *, is_reported: bool) -> Struc
 def unpack(row: Structured, track: Structured) -> None:
     """Write an archived record to a track.
 
-    `row`, shape (1,): the archived track. `track`, shape (1,): overwritten.
+    Parameters
+    ----------
+    row : (1,) record of `archived_dtype`
+        The archived track.
+    track : (1,) record of `CircleTrack` or `PolygonTrack`
+        Overwritten.
     """
     _copy_numbers(row, track)
     bins = track[BINS][0]
@@ -102,7 +118,12 @@ def unpack(row: Structured, track: Structured) -> None:
 def move_rows(rows: Structured, moves: MapMoves) -> None:
     """Move archived tracks with their maps of the way; corrections turn too little to turn covariances.
 
-    `rows`, shape (n,): updated.
+    Parameters
+    ----------
+    rows : (n,) record of `archived_dtype`
+        Updated.
+    moves : MapMoves
+        Of the maps.
     """
     for place in (rows, rows["challenger"]) if "challenger" in (rows.dtype.names or ()) else (rows,):
         place["x"], place["y"], turn = moves.moved(rows["submap"], place["x"], place["y"])
@@ -118,7 +139,11 @@ def newest_readings(bins: Structured) -> Structured:
     """Return the newest readings of bearings that lie evenly round, then the newest of each one: (≤ 48,) `Reading`.
 
     Before them come the silences that are the newest of their bearing: they show that the object has left.
-    `bins`, shape (n,): the bins.
+
+    Parameters
+    ----------
+    bins : (n,) record of `CircleBin` or `PolygonBin`
+        The bins.
     """
     counts, capacity = bins["count"], bins["readings"].shape[1]
     rank = np.arange(capacity)[:, None]
@@ -142,7 +167,12 @@ def newest_readings(bins: Structured) -> Structured:
 def bearing_bins(places: Floats, count: int) -> NDArray[np.int64]:
     """Return the bearing bins of places about the centre, as `reservoir.keep_reading` computes them; shape (n,).
 
-    `places`, shape (n, ≥ 2): x and y about the centre, m. `count`: number of bins of the full circle.
+    Parameters
+    ----------
+    places : (n, ≥ 2) float
+        x and y about the centre, m.
+    count : int
+        Number of bins of the full circle.
     """
     turns = np.arctan2(places[:, 1], places[:, 0]) / (2.0 * math.pi) + 0.5
     return (turns * count).astype(np.int64) % count

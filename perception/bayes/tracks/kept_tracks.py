@@ -49,8 +49,14 @@ def kept_walls(memory: Memory) -> str:
 def restore_track(memory: Memory, row: ObjectRow, bounds: Mapping[str, Bound]) -> str | None:
     """Put a track back in its own place, a free or a hypothesis' one; return None, or why that is impossible.
 
-    `memory`: updated. `row`: the object; its place is that of the track. `bounds`: as of
-    `perception.snapshot.bounds_of`.
+    Parameters
+    ----------
+    memory : Memory
+        Updated.
+    row : ObjectRow
+        The object; its place is that of the track.
+    bounds : mapping
+        As of `perception.snapshot.bounds_of`.
     """
     kind, _, text = row.kept.partition(":")
     tracks = {CIRCLE: memory.circles, POLYGON: memory.polygons}.get(kind)
@@ -74,7 +80,14 @@ def restore_track(memory: Memory, row: ObjectRow, bounds: Mapping[str, Bound]) -
 def restore_walls(memory: Memory, text: str, bounds: Mapping[str, Bound]) -> str | None:
     """Put the map of the walls back in place of the present one; return None, or why that is impossible.
 
-    `memory`: updated. `text`: from `kept_walls`. `bounds`: as of `perception.snapshot.bounds_of`.
+    Parameters
+    ----------
+    memory : Memory
+        Updated.
+    text : str
+        From `kept_walls`.
+    bounds : mapping
+        As of `perception.snapshot.bounds_of`.
     """
     room = _unpacked(text, memory.state["room"].dtype)
     if room is None or not _is_valid(ROOM, room, bounds):

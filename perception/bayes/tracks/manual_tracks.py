@@ -38,7 +38,14 @@ from perception.kernel import kernel
 def settle_circle(s: StateRecord, p: SettingsRecord, kind: int, x: float, y: float) -> None:
     """Set the scratch's hypothesis to a circle relaxed onto the map from (x, y).
 
-    `s`, `p`: memory and settings. `kind`: which circle. `x`, `y`: m.
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    kind : int
+        Which circle.
+    x, y : float
+        m.
     """
     hypothesis = s[0].scratch.hypothesis
     set_hypothesis(s, x, y, 0.0)
@@ -63,7 +70,14 @@ def mark_placed(track: CircleTrack) -> None:
 def place_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: int, x: float, y: float) -> int:
     """Start a circle track about (x, y) on the remembered readings; return its index, −1 without a free track.
 
-    `s`, `tracks`, `p`: memory and circles, updated, and settings. `kind`: which circle. `x`, `y`: m.
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    kind : int
+        Which circle.
+    x, y : float
+        m.
     """
     radius = p[0].circles[kind].radius_m
     settle_circle(s, p, kind, x, y)
@@ -81,7 +95,14 @@ def place_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: 
 def move_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int, x: float, y: float) -> None:
     """Restart circle track `t` about (x, y), on its own readings if near, else on the remembered ones.
 
-    `s`, `tracks`, `p`: memory and circles, updated, and settings. `t`: the track. `x`, `y`: m.
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    t : int
+        The track.
+    x, y : float
+        m.
     """
     track = tracks[t]
     kind = track.kind
@@ -102,7 +123,14 @@ def move_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int,
 def settle_polygon(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float, heading: float) -> None:
     """Set the scratch's hypothesis to a polygon relaxed onto the map from a pose.
 
-    `s`, `p`: memory and settings. `model`: which polygon. `x`, `y`, `heading`: m, rad.
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    model : int
+        Which polygon.
+    x, y, heading : float
+        m, rad.
     """
     hypothesis = s[0].scratch.hypothesis
     set_hypothesis(s, x, y, heading)
@@ -126,7 +154,14 @@ def leave_job(s: StateRecord, t: int) -> None:
 def place_polygon(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float, heading: float) -> int:
     """Start a polygon track about a pose on the remembered readings; return its index, −1 without a free track.
 
-    `s`, `p`: memory, updated, and settings. `model`: which polygon. `x`, `y`, `heading`: m, rad.
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    model : int
+        Which polygon.
+    x, y, heading : float
+        m, rad.
     """
     t = free_track(s[0].polygons)
     if t >= 0:
@@ -145,7 +180,14 @@ def place_polygon(s: StateRecord, p: SettingsRecord, model: int, x: float, y: fl
 def move_polygon(s: StateRecord, p: SettingsRecord, t: int, x: float, y: float, heading: float) -> None:
     """Restart polygon track `t` about a pose, on its own readings if near, else on the remembered ones.
 
-    `s`, `p`: memory, updated, and settings. `t`: the track. `x`, `y`, `heading`: m, rad.
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    t : int
+        The track.
+    x, y, heading : float
+        m, rad.
     """
     leave_job(s, t)
     track = s[0].polygons[t]

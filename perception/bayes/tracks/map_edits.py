@@ -48,8 +48,14 @@ def edit_memory(
 ) -> str | None:
     """Apply a user's edit; return None, or the reason why it cannot be done.
 
-    `memory`, `p`, `pins`: memory, updated, and settings. `rounds`, `outlines`: names of the round models and of the
-    polygons, in the order of their numbers.
+    Parameters
+    ----------
+    memory, p, pins
+        Memory, updated, and settings.
+    rounds, outlines : sequence of str
+        Names of the round models and of the polygons, in the order of their numbers.
+    edit : MemoryEdit
+        The edit.
     """
     match edit:
         case DeleteSegments(numbers):
@@ -148,7 +154,14 @@ def _reject(memory: Memory, p: SettingsRecord, row: int) -> None:
 def forget_hits(memory: Memory, p: SettingsRecord, x: float, y: float, inner: float, outer: float) -> None:
     """Delete the remembered readings that ended between two circles about (x, y), or near either circle.
 
-    `memory`, `p`: memory, updated, and settings. `x`, `y`: centre, m. `inner`, `outer`: radii of the circles, m.
+    Parameters
+    ----------
+    memory, p
+        Memory, updated, and settings.
+    x, y : float
+        Centre, m.
+    inner, outer : float
+        Radii of the circles, m.
     """
     half_angle, gate = float(p[0].half_angle_rad), float(p[0].gate_m)
     sensors = memory.state["sensors"][0]

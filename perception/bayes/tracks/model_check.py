@@ -109,8 +109,14 @@ def wall_evidence(
 ) -> float:
     """Return the greatest log likelihood ratio (nat) of a range under the mapped walls, off all without one.
 
-    `room`, `q`, `p`, `level`, `edges`: as for `room_evidence`. `margin`: so far beyond its ends a span answers, m.
-    `length_min`: length of the spans that count, at least, m.
+    Parameters
+    ----------
+    room, q, p, level, edges
+        As for `room_evidence`.
+    margin : float
+        So far beyond its ends a span answers, m.
+    length_min : float
+        Length of the spans that count, at least, m.
     """
     best = float(p[0].table[level, TABLE_BINS - 1])
     for k in range(MAX_WALLS):
@@ -132,8 +138,14 @@ def wall_evidence(
 def room_evidence(room: WallMap, q: Reading, p: SettingsRecord, level: int, edges: bool) -> float:
     """Return the greatest log likelihood ratio (nat) of a range under the mapped walls, corners and edges.
 
-    `room`, `q`, `p`: walls and corners, the reading and the settings. `level`: its noise level. `edges`: whether
-    walls answer from the beam's edge.
+    Parameters
+    ----------
+    room, q, p
+        Walls and corners, the reading and the settings.
+    level : int
+        Its noise level.
+    edges : bool
+        Whether walls answer from the beam's edge.
     """
     best = wall_evidence(room, q, p, level, edges, ROOM_MARGIN_M, 0.0)
     for c in range(CORNERS_MAX):
@@ -149,7 +161,12 @@ def room_evidence(room: WallMap, q: Reading, p: SettingsRecord, level: int, edge
 def is_on_long_walls(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> bool:
     """Return whether mapped walls that are longer than a polygon's sides explain the job's readings better than it.
 
-    `s`, `p`: memory and settings. `track`: the track, with its evidence.
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : PolygonTrack
+        The track, with its evidence.
     """
     outline, room = p[0].polygons[track.model], s[0].room
     longest = outline.inner_radius_m
@@ -172,8 +189,14 @@ def is_on_long_walls(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> 
 def check_model(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> None:
     """Update the lead of the mapped room over a track, and from how many sides it was heard.
 
-    `s`, `p`: memory and settings. `track`: updated. `n`: its readings, the first of the scratch, and what it predicts
-    of them its `own`.
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : CircleTrack
+        Updated.
+    n : int
+        Its readings, the first of the scratch, and what it predicts of them its `own`.
     """
     scratch, room = s[0].scratch, s[0].room
     sides = scratch.sides
@@ -216,7 +239,14 @@ def is_named_near(tracks: CircleTracks, x: float, y: float, apart: float) -> boo
 def count_names(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int, x: float, y: float) -> None:
     """Count the name of a track that was named before its refinement: as confirmed, as withdrawn, or not yet.
 
-    `s`, `tracks`, `p`: memory and circles, updated, and settings. `t`: the track. `x`, `y`: where it was before, m.
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    t : int
+        The track.
+    x, y : float
+        Where it was before, m.
     """
     track = tracks[t]
     if track.status == ESTABLISHED and track.is_named == 1:

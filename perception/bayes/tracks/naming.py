@@ -67,8 +67,12 @@ def best_other_lead(track: CircleTrack, p: SettingsRecord) -> float:
 def is_name_doubtful(track: CircleTrack, p: SettingsRecord, sure: float, careful: bool) -> bool:
     """Return whether a model's checks speak against its name; see `perception.bayes.tracks.model_check`.
 
-    `track`, `p`, `sure`: as of `update_name`. `careful`: whether the prior is as much against a model as it is for it
-    elsewhere.
+    Parameters
+    ----------
+    track, p, sure
+        As of `update_name`.
+    careful : bool
+        Whether the prior is as much against a model as it is for it elsewhere.
     """
     if track.room_lead > IN_WALL_NAT:
         return True
@@ -136,8 +140,13 @@ def withdraw_overlapping(tracks: CircleTracks, t: int) -> None:
     """Withdraw the name of every circle that overlaps a named one of more evidence: bodies do not.
 
     Behind a drum nothing is heard, so that little contradicts what a few strays seem to show there.
-    `tracks`, shape (n,): updated. `t`: a circle that was just named, or not: only pairs that it is one of are
-    compared.
+
+    Parameters
+    ----------
+    tracks : (n,) CircleTrack
+        Updated.
+    t : int
+        A circle that was just named, or not: only pairs that it is one of are compared.
     """
     track = tracks[t]
     for k in range(len(tracks)):
@@ -159,8 +168,15 @@ def report_circles(tracks: CircleTracks, p: SettingsRecord, reported: Records[Re
 
     A model is reported for its readings or for a user's mark. A mark on a circle of another kind, which only a
     damaged file has, does not count.
-    `tracks`, `p`: the circles, and how many of their kinds are models. `reported`, shape (n,): the values each was
-    last reported with; updated. `sure`, shape (≥ n,): out.
+
+    Parameters
+    ----------
+    tracks, p
+        The circles, and how many of their kinds are models.
+    reported : (n,) Reported
+        The values each was last reported with; updated.
+    sure : (≥ n,) int
+        Out.
     """
     n = 0
     for t in range(len(tracks)):
@@ -231,7 +247,14 @@ def is_sure_polygon(track: PolygonTrack, least: float) -> bool:
 def sure_polygons(s: StateRecord, least: float, out: Ints) -> int:
     """Write the polygons that are sure, or marked by a user, to `out`; return the number of them.
 
-    `s`, shape (1,): memory. `least`: least probability. `out`, shape (≥ MAX_POLYGONS,): out.
+    Parameters
+    ----------
+    s : (1,) State
+        Memory.
+    least : float
+        Least probability.
+    out : (≥ MAX_POLYGONS,) int
+        Out.
     """
     n = 0
     for t in range(MAX_POLYGONS):

@@ -44,8 +44,14 @@ NO_EVIDENCE, IN_FRONT, BEARS = range(3)
 def associate_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int, first: int = 0) -> None:
     """Associate fired readings with the established circles that explain them best.
 
-    `s`, `tracks`, `p`: memory and circles, updated, and settings. `m`: number of fired readings, the first of the
-    scratch. `first`: the first of them that is to be associated.
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    m : int
+        Number of fired readings, the first of the scratch.
+    first : int
+        The first of them that is to be associated.
     """
     var0, rel2 = noise_variance(s, p)
     for i in range(first, m):
@@ -126,8 +132,13 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
 
     The others do not make a sure circle due for refinement: eight at a time, they would several times in a metre, and
     with each its name would be at stake anew, on readings that say the same.
-    `s`, `tracks`, `p`: memory, circles (updated) and settings. `m`: number of echoes, the first of the scratch; its
-    cross paths follow them.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory, circles (updated) and settings.
+    m : int
+        Number of echoes, the first of the scratch; its cross paths follow them.
     """
     offset = s[0].crosses_kept - s[0].scratch.crosses - m  # from a place in the scratch to one in the memory
     for t in range(len(tracks)):
@@ -160,7 +171,10 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
 def update_history(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> None:
     """Add the firing to the sensors' histories, at their spacing, and update the noise from its roughness.
 
-    `s`, `p`, `m`, `time_s`: as for `make_segments`.
+    Parameters
+    ----------
+    s, p, m, time_s
+        As for `make_segments`.
     """
     for i in range(m):
         q = s[0].scratch.fired[i]
@@ -191,7 +205,12 @@ def update_history(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> 
 def surest_segment(segments: Records[PairSegment], s: StateRecord, p: SettingsRecord) -> int:
     """Return the index of the unexplained segment that locates a centre behind it best; −1 where none is good enough.
 
-    `segments`, shape (n,): segments of this firing. `s`, `p`: memory and settings.
+    Parameters
+    ----------
+    segments : (n,) PairSegment
+        Segments of this firing.
+    s, p
+        Memory and settings.
     """
     chosen = -1
     best = p[0].hypothesis_sigma_m
@@ -210,7 +229,12 @@ def surest_segment(segments: Records[PairSegment], s: StateRecord, p: SettingsRe
 def propose(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, made: int) -> None:
     """Start hypotheses from unexplained segments, the surest first.
 
-    `s`, `tracks`, `p`: memory and circles, updated, and settings. `made`: segments of this firing.
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    made : int
+        Segments of this firing.
     """
     segments = s[0].scratch.segments[:made]
     tries = 0

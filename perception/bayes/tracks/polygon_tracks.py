@@ -130,7 +130,12 @@ def merge_polygons(s: StateRecord, p: SettingsRecord, t: int) -> None:
 def begin_refinement(s: StateRecord, p: SettingsRecord, threshold: float) -> bool:
     """Begin a job for the polygon to refine next; return whether there is one.
 
-    `s`, `p`: memory, updated, and settings. `threshold`: least share of unseen evidence of a track to refine.
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    threshold : float
+        Least share of unseen evidence of a track to refine.
     """
     chosen = choose_polygon(s, p, threshold)
     if chosen < 0:
@@ -192,7 +197,13 @@ def advance_refinement(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, 
 
     Readings are divided between the track and its neighbours; its pose is searched, widely and then near by; the
     evidence there decides its status; its covariance is computed last.
-    `s`, `tracks`, `p`: memory and circles, updated, and settings. `left`: what is left of the quantum.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    left : int
+        What is left of the quantum.
     """
     job = s[0].job
     t = job.track
@@ -245,7 +256,13 @@ def polygon_quantum(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, thr
     """Continue the job for a quantum, or else begin the next job; return whether there was one.
 
     Refinements and hypotheses take turns where both wait.
-    `s`, `tracks`, `p`: memory and circles, updated, and settings. `threshold`: as for `begin_refinement`.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    threshold : float
+        As for `begin_refinement`.
     """
     job = s[0].job
     if job.kind == NO_JOB:

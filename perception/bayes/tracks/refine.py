@@ -75,7 +75,10 @@ from perception.shared_numbers import CERTAIN_PROBABILITY
 def fit_start(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> None:
     """Move a track to its robust fit where the two lie far apart or the track is young.
 
-    `s`, `p`, `track`, `n`: as for `locate_circle`.
+    Parameters
+    ----------
+    s, p, track, n
+        As for `locate_circle`.
     """
     fit = s[0].scratch.circle_fit
     noise = noise_variance(s, p)
@@ -113,7 +116,14 @@ def fit_start(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> 
 def locate_circle(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> None:
     """Update a track's position, mean and covariance, by a robust fit and a search across the beam.
 
-    `s`, `p`: memory and settings. `track`: updated. `n`: its readings, the first of the scratch.
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : CircleTrack
+        Updated.
+    n : int
+        Its readings, the first of the scratch.
     """
     fit_start(s, p, track, n)
     if max(track.root_xx, track.root_yy) > UNSURE_ROOT_M and search_across(s, p, track, n):
@@ -150,7 +160,10 @@ def locate_circle(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int)
 def update_score(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> float:
     """Update a track's evidence and what it predicts; return its log prior as a model, nat.
 
-    `s`, `p`, `track`, `n`: as for `locate_circle`.
+    Parameters
+    ----------
+    s, p, track, n
+        As for `locate_circle`.
     """
     scratch = s[0].scratch
     said = scratch.score
@@ -203,7 +216,13 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
 
     `leads` holds the lead of each at its last comparison. (Log ratios of different ages cannot be compared: the
     readings have changed in between.)
-    `s`, `p`, `track`, `n`: as for `locate_circle`. `prior`: from `update_score`.
+
+    Parameters
+    ----------
+    s, p, track, n
+        As for `locate_circle`.
+    prior : float
+        From `update_score`.
     """
     line, corner = p[0].circle_count, p[0].circle_count + 1
     var0, rel2 = noise_variance(s, p)
@@ -246,7 +265,14 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
 def existence_probability(s: StateRecord, p: SettingsRecord, track: CircleTrack, prior: float) -> float:
     """Return the probability of a track's explanation among all: radii, line, corner, other bodies, nothing.
 
-    `s`, `p`: memory and settings. `prior`: from `update_score`.
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : CircleTrack
+        The track.
+    prior : float
+        From `update_score`.
     """
     kind = track.kind
     line = p[0].circle_count
@@ -328,8 +354,12 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
 def quantum(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, threshold: float) -> bool:
     """Refine the circle that is next; return whether another circle waits.
 
-    `s`, `tracks`, `p`: memory and circles, updated, and settings. `threshold`: unseen evidence for an object's size
-    from which on it waits for refinement.
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    threshold : float
+        Unseen evidence for an object's size from which on it waits for refinement.
     """
     t = choose_circle(s, tracks, p, threshold)
     if t >= 0:

@@ -87,7 +87,12 @@ class TrackArchive:
     def update(self, memory: Memory, p: SettingsRecord, sure: float) -> bool:
         """Archive or take up at most one object of each kind; return whether any track became another.
 
-        `memory`, `p`: memory, updated, and settings. `sure`: least probability with which a polygon is reported.
+        Parameters
+        ----------
+        memory, p
+            Memory, updated, and settings.
+        sure : float
+            Least probability with which a polygon is reported.
         """
         has_changed = False
         numbered: int = memory.objects_numbered.item()
@@ -109,7 +114,10 @@ class TrackArchive:
     def make_room(self, memory: Memory, p: SettingsRecord, sure: float) -> None:
         """Archive the farthest object of each kind of which no track is free.
 
-        `memory`, `p`, `sure`: as for `update`.
+        Parameters
+        ----------
+        memory, p, sure
+            As for `update`.
         """
         for kind in self._kinds(memory, p, sure):
             self._is_due |= kind.make_room(self._looked_x, self._looked_y)
@@ -117,7 +125,12 @@ class TrackArchive:
     def take_up(self, memory: Memory, p: SettingsRecord, sure: float, number: int) -> None:
         """Make an archived object a track again, in place of the farthest if there is no other; nothing if unknown.
 
-        `memory`, `p`, `sure`: as for `update`. `number`: the object's number.
+        Parameters
+        ----------
+        memory, p, sure
+            As for `update`.
+        number : int
+            The object's number.
         """
         for kind in self._kinds(memory, p, sure):
             if kind.archive.find(number) is not None:
@@ -129,7 +142,12 @@ class TrackArchive:
     def borrowed(self, memory: Memory, p: SettingsRecord, number: int) -> Iterator[None]:
         """Make an archived object a track for a look at it; afterwards all is as before. Nothing if unknown.
 
-        `number`: the object's number.
+        Parameters
+        ----------
+        memory, p
+            Memory and settings.
+        number : int
+            The object's number.
         """
         for kind in self._kinds(memory, p, 1.0):
             row = kind.archive.find(number)
@@ -198,7 +216,12 @@ class _Kind(ABC):
     def recognise_new(self, numbered: int, merge_m: float) -> bool:
         """Make each track that has started in the place of an archived object that object; return whether any has.
 
-        `numbered`: tracks of greater numbers are new. `merge_m`: two objects nearer than this are one, m.
+        Parameters
+        ----------
+        numbered : int
+            Tracks of greater numbers are new.
+        merge_m : float
+            Two objects nearer than this are one, m.
         """
         has_changed = False
         new = np.flatnonzero((self.tracks["number"] > numbered) & (self.tracks["status"] != FREE))

@@ -55,7 +55,14 @@ def unseen_evidence(track: AnyTrack, idle_firings: int, threshold: float, weight
 def circle_value(track: CircleTrack, p: SettingsRecord, threshold: float) -> float:
     """Return the value of a quantum for a circle; above `threshold` the circle waits for refinement.
 
-    `p`, shape (1,): settings. `threshold`: value from which on a track waits for refinement.
+    Parameters
+    ----------
+    track : CircleTrack
+        The circle.
+    p : (1,) Settings
+        Settings.
+    threshold : float
+        Value from which on a track waits for refinement.
     """
     if track.status == FREE:
         return 0.0
@@ -68,7 +75,15 @@ def priority(s: StateRecord, p: SettingsRecord, value: float, track: CircleTrack
     """Return the priority of a circle; the circle of greatest priority is refined next.
 
     At the end of the ring's range a track counts half as much as next to the robot.
-    `s`, `p`: memory and settings. `value`: from `circle_value`.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    value : float
+        From `circle_value`.
+    track : CircleTrack
+        The circle.
     """
     if track.passed_over > PASSED_OVER_MAX:
         return OVERDUE + track.passed_over
@@ -79,7 +94,12 @@ def priority(s: StateRecord, p: SettingsRecord, value: float, track: CircleTrack
 def is_waiting(tracks: CircleTracks, p: SettingsRecord, threshold: float) -> bool:
     """Return whether a circle waits for refinement.
 
-    `threshold`: value from which on a track waits for refinement.
+    Parameters
+    ----------
+    tracks, p
+        Circles and settings.
+    threshold : float
+        Value from which on a track waits for refinement.
     """
     most = 0.0
     for t in range(len(tracks)):
@@ -91,8 +111,12 @@ def is_waiting(tracks: CircleTracks, p: SettingsRecord, threshold: float) -> boo
 def choose_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, threshold: float) -> int:
     """Return the circle to refine next, −1 where none waits; count a pass for the others that wait.
 
-    `s`, `tracks`, `p`: memory, circles (updated) and settings. `threshold`: value from which on a track waits for
-    refinement.
+    Parameters
+    ----------
+    s, tracks, p
+        Memory, circles (updated) and settings.
+    threshold : float
+        Value from which on a track waits for refinement.
     """
     best = -1.0
     chosen = -1
@@ -115,7 +139,13 @@ def choose_polygon(s: StateRecord, p: SettingsRecord, threshold: float) -> int:
     """Return the polygon to refine next, or −1; the choice is that of `choose_circle` without regard to distance.
 
     Polygons that face each other across a passage share readings: with the nearer one first, one was found twice.
-    `s`, `p`: memory, updated, and settings. `threshold`: value from which on a track waits for refinement.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    threshold : float
+        Value from which on a track waits for refinement.
     """
     best = -1.0
     chosen = -1

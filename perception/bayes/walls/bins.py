@@ -84,7 +84,10 @@ def clear_bins(wall: Wall) -> None:
 def free(wall: Wall) -> None:
     """Free a wall's place, as `clear_wall` does in compiled code.
 
-    `wall`: a record of numpy.
+    Parameters
+    ----------
+    wall : Wall
+        A record of numpy.
     """
     wall.weight, wall.reviewed.information, wall.is_changed, wall.span_count = 0.0, 0.0, 0, 0
     np.asarray(wall.bins).view(np.uint8)[...] = 0
@@ -103,8 +106,14 @@ def fade(of: WallBin, share: float) -> None:
 def enter_reading(room: WallMap, wall: Wall, q: Reading, kind: int, p: SettingsRecord) -> None:
     """Enter an echo of a wall into the bin where it touches the wall.
 
-    `room`: the noise. `wall`: updated, but not fitted. `q`, `kind`, `p`: the reading, `FOOT` or `BEAM_EDGE`, and the
-    settings.
+    Parameters
+    ----------
+    room : WallMap
+        The noise.
+    wall : Wall
+        Updated, but not fitted.
+    q, kind, p
+        The reading, `FOOT` or `BEAM_EDGE`, and the settings.
     """
     nx, ny = wall_normal(wall)
     weight = 1.0
@@ -139,7 +148,12 @@ def enter_reading(room: WallMap, wall: Wall, q: Reading, kind: int, p: SettingsR
 def enter_pass(wall: Wall, b: int, weight: float) -> None:
     """Enter a range that passed through a bin.
 
-    `wall`, `b`: the wall, updated, and the bin. `weight`: 1, or `SILENT_PASS` for a silence.
+    Parameters
+    ----------
+    wall, b
+        The wall, updated, and the bin.
+    weight : float
+        1, or `SILENT_PASS` for a silence.
     """
     of = wall.bins[b]
     of.passes = min(of.passes + weight, PASSES_MAX)

@@ -105,7 +105,12 @@ def wall_point(wall: Wall, along: float) -> tuple[float, float]:
 def distance_and_foot(wall: Wall, x: float, y: float) -> tuple[float, float]:
     """Return a point's distance before a wall, and the position of its foot along the wall, m.
 
-    `x`, `y`: the point, m.
+    Parameters
+    ----------
+    wall : Wall
+        The wall.
+    x, y : float
+        The point, m.
     """
     dx = x - wall.origin_x
     dy = y - wall.origin_y
@@ -134,9 +139,18 @@ def contact(wall: Wall, q: Reading, p: SettingsRecord) -> tuple[int, float, floa
 def touch(wall: Wall, q: Reading, p: SettingsRecord, least: float) -> tuple[int, float, float, float]:
     """Return where a reading would touch a wall without ends.
 
-    `least`: least cosine between the sensor's axis and the normal.
-    Returned: `FOOT`, `BEAM_EDGE` or `NOWHERE`; the range, m; the position along the wall, m; the cosine between the
-    sensor's axis and the normal.
+    Parameters
+    ----------
+    wall, q, p
+        The wall, the reading and the settings.
+    least : float
+        Least cosine between the sensor's axis and the normal.
+
+    Returns
+    -------
+    (int, float, float, float)
+        `FOOT`, `BEAM_EDGE` or `NOWHERE`; the range, m; the position along the wall, m; the cosine between the
+        sensor's axis and the normal.
     """
     nx, ny = wall_normal(wall)
     dot = nx * q.axis_x + ny * q.axis_y
@@ -163,8 +177,14 @@ def line_variance(wall: Wall, along: float) -> float:
 def tolerance(room: WallMap, wall: Wall, along: float, range_m: float, dot: float) -> float:
     """Return the greatest error of a range that a wall explains, m.
 
-    `room`, `wall`: the noise, and the wall. `along`, `range_m`: position along the wall, and the range, m. `dot`:
-    cosine between the sensor's axis and the wall's normal.
+    Parameters
+    ----------
+    room, wall
+        The noise, and the wall.
+    along, range_m : float
+        Position along the wall, and the range, m.
+    dot : float
+        Cosine between the sensor's axis and the wall's normal.
     """
     return EXPLAINED_SIGMAS * math.sqrt(range_sigma(room, range_m) ** 2 + line_variance(wall, along) / dot**2)
 
@@ -199,7 +219,12 @@ def is_on_straight_span(wall: Wall, along: float) -> bool:
 def cuts_circle(room: WallMap, x: float, y: float, radius: float) -> bool:
     """Return whether a wall that is straight beyond doubt passes through a circle, at least this near to its centre.
 
-    `x`, `y`, `radius`: the centre, and how near, m.
+    Parameters
+    ----------
+    room : WallMap
+        The walls.
+    x, y, radius : float
+        The centre, and how near, m.
     """
     for k in range(MAX_WALLS):
         wall = room.walls[k]
@@ -215,8 +240,14 @@ def explaining_wall(room: WallMap, q: Reading, p: SettingsRecord, growth: float)
     """Return the wall that explains an echo best, where from, and the error as a share of the greatest explained.
 
     −1, `NOWHERE` and 1 where none does.
-    `growth`: if no wall explains it where it has a span, a wall may continue this far beyond, m; half of it where the
-    echo comes from the beam's edge. 0: none may.
+
+    Parameters
+    ----------
+    room, q, p
+        The walls, the reading and the settings.
+    growth : float
+        If no wall explains it where it has a span, a wall may continue this far beyond, m; half of it where the
+        echo comes from the beam's edge. 0: none may.
     """
     best = -1
     best_kind = NOWHERE
@@ -250,8 +281,12 @@ def explaining_wall(room: WallMap, q: Reading, p: SettingsRecord, growth: float)
 def is_from_point(room: WallMap, q: Reading, x: float, y: float, slack: float, p: SettingsRecord) -> bool:
     """Return whether an echo may come from a point.
 
-    `room`, `q`, `p`: the noise, the reading and the settings. `x`, `y`, `slack`: the point, and the uncertainty of
-    its place, m.
+    Parameters
+    ----------
+    room, q, p
+        The noise, the reading and the settings.
+    x, y, slack : float
+        The point, and the uncertainty of its place, m.
     """
     dx = x - q.x
     dy = y - q.y
@@ -265,8 +300,14 @@ def is_from_point(room: WallMap, q: Reading, x: float, y: float, slack: float, p
 def is_from_circle(room: WallMap, tracks: CircleTracks, q: Reading, p: SettingsRecord, probability: float) -> bool:
     """Return whether a certain circle explains an echo, by its nearest point or where the beam's edge meets it.
 
-    `room`, `q`, `p`: the noise, the echo and the settings. `tracks`, shape (n,): the circles. `probability`: a circle
-    is certain from here on; a named one is at any.
+    Parameters
+    ----------
+    room, q, p
+        The noise, the echo and the settings.
+    tracks : (n,) CircleTrack
+        The circles.
+    probability : float
+        A circle is certain from here on; a named one is at any.
     """
     edges = edges_answer(room)
     for t in range(len(tracks)):
@@ -295,7 +336,14 @@ def is_from_circle(room: WallMap, tracks: CircleTracks, q: Reading, p: SettingsR
 def is_hidden(tracks: CircleTracks, q: Reading, x: float, y: float) -> bool:
     """Return whether a round object stands between a sensor and a point, so that no echo can come from there.
 
-    `tracks`, shape (n,): the circles; only certain ones count. `q`: the sensor. `x`, `y`: the point, m.
+    Parameters
+    ----------
+    tracks : (n,) CircleTrack
+        The circles; only certain ones count.
+    q : Reading
+        The sensor.
+    x, y : float
+        The point, m.
     """
     dx = x - q.x
     dy = y - q.y

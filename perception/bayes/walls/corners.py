@@ -311,8 +311,12 @@ def point_of(
 ) -> tuple[int, float]:
     """Return the corner that explains an echo best, and the error as a share of the greatest explained; −1, 1: none.
 
-    `room`, `q`, `p`: the noise, the reading and the settings. `corners`, `count`: the corners or the edges, and their
-    number.
+    Parameters
+    ----------
+    room, q, p
+        The noise, the reading and the settings.
+    corners, count
+        The corners or the edges, and their number.
     """
     best = -1
     least = 1.0
@@ -360,8 +364,12 @@ def enter_looks(
 ) -> None:
     """Count a reading for or against the corners towards which it looked.
 
-    `room`, `tracks`, `q`, `p`: the noise, the circles, what lies behind which is not seen, the reading and the
-    settings. `corners`, `count`: the corners or the edges, updated, and their number.
+    Parameters
+    ----------
+    room, tracks, q, p
+        The noise, the circles, what lies behind which is not seen, the reading and the settings.
+    corners, count
+        The corners or the edges, updated, and their number.
     """
     for c in range(count):
         corner = corners[c]

@@ -48,7 +48,12 @@ WALL_MIN_M: Final = 0.5
 def line_chi2(wall: Wall, first: int, end: int) -> tuple[float, int]:
     """Return χ² of the best line through some spans of a wall, each bin's bounded, and the number of bins.
 
-    `first`, `end`: the spans, end excluded.
+    Parameters
+    ----------
+    wall : Wall
+        The wall.
+    first, end : int
+        The spans, end excluded.
     """
     middle = 0.5 * (wall.spans[first].low + wall.spans[end - 1].high)
     n = 0
@@ -151,9 +156,18 @@ def circle_chi2(wall: Wall, first: int, end: int, radius: float, p: SettingsReco
 def flatness(wall: Wall, first: int, end: int, p: SettingsRecord) -> tuple[float, float]:
     """Return the evidence for a line against a circle in the best place, and how well the line fits.
 
-    `first`, `end`: the spans compared, end excluded.
-    Returned: χ² of the circle less χ² of the line, and χ² of the line for each degree of freedom, each bin's bounded:
-    a few echoes of other surfaces do not make a long line crooked.
+    Parameters
+    ----------
+    wall, p
+        The wall and the settings.
+    first, end : int
+        The spans compared, end excluded.
+
+    Returns
+    -------
+    (float, float)
+        χ² of the circle less χ² of the line, and χ² of the line for each degree of freedom, each bin's bounded: a few
+        echoes of other surfaces do not make a long line crooked.
     """
     line, n = line_chi2(wall, first, end)
     if n < FLAT_BINS_MIN:

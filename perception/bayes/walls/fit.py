@@ -237,8 +237,12 @@ def find_spans(room: WallMap, wall: Wall) -> None:
 def fit_walls(s: StateRecord, p: SettingsRecord, first: int, end: int, step: int) -> None:
     """Find the spans of the walls whose bins have changed, fit, judge and number them; end those that fade away.
 
-    `s`, `p`: memory, updated, and settings. `first`, `end`, `step`: only every `step`-th wall from `first` on, `end`
-    excluded.
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    first, end, step : int
+        Only every `step`-th wall from `first` on, `end` excluded.
     """
     room = s[0].room
     for k in range(first, end, step):

@@ -77,7 +77,12 @@ REPLACED_WEIGHT_MAX: Final = 12.0
 def candidate(a: Reading, b: Reading, choice: int, p: SettingsRecord) -> tuple[bool, float, float, float]:
     """Return a line that explains two echoes: whether there is one, its normal, and its distance from the origin, m.
 
-    `choice`: 0, 1: the common tangents; 2, 3: through the ends of the beams' left edges, and of the right ones.
+    Parameters
+    ----------
+    a, b, p
+        The readings and the settings.
+    choice : int
+        0, 1: the common tangents; 2, 3: through the ends of the beams' left edges, and of the right ones.
     """
     dx = b.x - a.x
     dy = b.y - a.y
@@ -114,7 +119,13 @@ def find_near(s: StateRecord, p: SettingsRecord, newest: int) -> int:
     """Copy the recent readings that may bear on a line through one of them to the scratch, and return their number.
 
     It is 0 if too few of them are echoes that nothing explains.
-    `s`, `p`: memory and settings; the scratch is updated. `newest`: the place of the one.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings; the scratch is updated.
+    newest : int
+        The place of the one.
     """
     room = s[0].room
     q = room.recent[newest].reading
@@ -136,7 +147,12 @@ def find_near(s: StateRecord, p: SettingsRecord, newest: int) -> int:
 def best_line(s: StateRecord, p: SettingsRecord, newest: int) -> bool:
     """Write the best line through a recent echo and another one to the candidate; return whether it is good enough.
 
-    `s`, `p`: memory, updated, and settings. `newest`: the echo's place among the recent readings.
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    newest : int
+        The echo's place among the recent readings.
     """
     room = s[0].room
     wall = room.walls[CANDIDATE]
@@ -186,7 +202,10 @@ def best_line(s: StateRecord, p: SettingsRecord, newest: int) -> bool:
 def enter_recent(s: StateRecord, p: SettingsRecord) -> int:
     """Put the recent readings that bear on the candidate into its bins anew; return the number of echoes among them.
 
-    `s`, `p`: memory and settings; the echoes entered are marked as taken, and the frame turns onto the line.
+    Parameters
+    ----------
+    s, p
+        Memory and settings; the echoes entered are marked as taken, and the frame turns onto the line.
     """
     room = s[0].room
     wall = room.walls[CANDIDATE]
@@ -228,7 +247,12 @@ def enter_recent(s: StateRecord, p: SettingsRecord) -> int:
 def end_candidate(s: StateRecord, is_new: bool) -> None:
     """Free the candidate's place, and mark the echoes that it took: as known if it has become a wall.
 
-    `s`: memory, updated. `is_new`: whether it has.
+    Parameters
+    ----------
+    s
+        Memory, updated.
+    is_new : bool
+        Whether it has.
     """
     room = s[0].room
     room.walls[CANDIDATE].weight = 0.0
@@ -263,7 +287,13 @@ def try_wall(memory: Memory, p: SettingsRecord, newest: int) -> bool:
     """Look for a wall through a recent echo, and add it; return whether there is one.
 
     It replaces a light wall where there are too many.
-    `memory`, `p`: updated, and the settings. `newest`: the echo's place among the recent readings.
+
+    Parameters
+    ----------
+    memory, p
+        Updated, and the settings.
+    newest : int
+        The echo's place among the recent readings.
     """
     if not best_line(memory.s, p, newest):
         return False

@@ -51,8 +51,14 @@ class Incidences:
 def fit_together(walls: Lines, corners: Structured, numbers: Sequence[int]) -> Floats:
     """Return the lines of walls, corrected by the corners that are heard on them, which are corrected in place.
 
-    `corners`, shape (m,): corners of any walls, `second` −1 where only one is known; those that are heard get their
-    new places. `numbers`: the walls' numbers, by which corners refer to them.
+    Parameters
+    ----------
+    walls : Lines
+        The walls.
+    corners : (m,) record of `RoomCorner`
+        Corners of any walls, `second` −1 where only one is known; those that are heard get their new places.
+    numbers : sequence of int
+        The walls' numbers, by which corners refer to them.
     """
     is_heard = (corners["is_used"] == KEPT) & (corners["is_edge"] == 0) & (corners["echoes"] >= CORNER_ECHOES_MIN)
     heard = np.flatnonzero(is_heard & (corners["echoes"] > corners["passes"]))
@@ -102,8 +108,12 @@ def _solve(
 ) -> tuple[Floats, Floats, Floats]:
     """Return the lines (n, 5), and the points' places (m, 2) and covariances xx, xy, yy (m, 3).
 
-    `walls`, `points`, `held`: the walls, the points, and which of these lie on which. `at`, shape (k,): the points of
-    `held` as places in `points`.
+    Parameters
+    ----------
+    walls, points, held
+        The walls, the points, and which of these lie on which.
+    at : (k,) int
+        The points of `held` as places in `points`.
     """
     lines, n = walls.lines.copy(), 2 * len(walls.lines)
     a, b = 2 * np.arange(len(lines)), n + 2 * np.arange(len(points))

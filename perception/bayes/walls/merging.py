@@ -156,8 +156,12 @@ def find_frameless(s: StateRecord, first: int) -> int:
 def reframe(walls: Structured, k: int) -> None:
     """Give wall `k` a frame along its line, about the middle of its readings.
 
-    `walls`, shape (MAX_WALLS + 1,): all walls; the candidate's place is used, and free afterwards. `k`: the wall,
-    updated, to be fitted again.
+    Parameters
+    ----------
+    walls : (MAX_WALLS + 1,) record of `Wall`
+        All walls; the candidate's place is used, and free afterwards.
+    k : int
+        The wall, updated, to be fitted again.
     """
     wall, old = walls[k], walls[CANDIDATE]
     walls[CANDIDATE] = wall
@@ -205,7 +209,10 @@ def is_from_wall(room: WallMap, wall: Wall, q: Reading, p: SettingsRecord) -> bo
 def release(room: WallMap, wall: Wall, p: SettingsRecord) -> None:
     """Let the recent echoes that a wall explains start new walls.
 
-    `room`, `wall`, `p`: the recent readings, updated, the wall and the settings.
+    Parameters
+    ----------
+    room, wall, p
+        The recent readings, updated, the wall and the settings.
     """
     for j in range(min(room.recent_count, RECENT_READINGS_MAX)):
         q = room.recent[j].reading
@@ -229,7 +236,13 @@ def drop_explained(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, turn
 
     Those are lines across a corner, or along some ends. While the robot stands, no other explanation ends what was
     sure when it stopped: that explained the same readings before.
-    `s`, `tracks`, `p`: memory, updated, circles and settings. `turn`: counts the calls: each looks at the next wall.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory, updated, circles and settings.
+    turn : int
+        Counts the calls: each looks at the next wall.
     """
     room = s[0].room
     own = -1

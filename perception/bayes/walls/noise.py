@@ -32,8 +32,12 @@ CHANGE_MIN: Final = 0.1
 def add_residual(room: WallMap, wall: Wall, error: float, along: float, range_m: float) -> None:
     """Count the error of an echo of a wall, if the wall is sure.
 
-    `room`, `wall`: the sums, updated, and the wall. `error`, `along`, `range_m`: range less predicted, position along
-    the wall, and the predicted range, m.
+    Parameters
+    ----------
+    room, wall
+        The sums, updated, and the wall.
+    error, along, range_m : float
+        Range less predicted, position along the wall, and the predicted range, m.
     """
     variance = range_sigma(room, range_m) ** 2
     if line_variance(wall, along) > SURE_SHARE * variance:
@@ -87,7 +91,12 @@ def estimate_noise(s: StateRecord, p: SettingsRecord) -> None:
 def change_noise(room: WallMap, variance_m2: float, relative_variance: float) -> None:
     """Set the noise assumed, and weigh the echoes in all bins, and their errors, by it.
 
-    `room`: updated. `variance_m2`, `relative_variance`: of a range r: `variance_m2` + `relative_variance` · r².
+    Parameters
+    ----------
+    room : WallMap
+        Updated.
+    variance_m2, relative_variance : float
+        Of a range r: `variance_m2` + `relative_variance` · r².
     """
     for k in range(MAX_WALLS):
         wall = room.walls[k]

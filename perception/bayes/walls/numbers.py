@@ -29,7 +29,12 @@ def has_number(wall: Wall, number: int) -> bool:
 def number_spans(s: StateRecord, k: int) -> None:
     """Give each span of a wall its number, after the spans were found anew.
 
-    `s`, shape (1,): updated. `k`: the wall's place.
+    Parameters
+    ----------
+    s : (1,) State
+        Updated.
+    k : int
+        The wall's place.
     """
     wall = s[0].room.walls[k]
     for i in range(wall.span_count):

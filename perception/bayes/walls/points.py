@@ -83,7 +83,12 @@ LINE_CELLS: Final = int((WALL_BINS * WALL_BIN_M + 2.0 * HEARD_REACH_M) / LINE_CE
 def choose_wall(s: StateRecord, turn: int) -> int:
     """Return the wall on whose line points are looked for; −1 if there is none.
 
-    `turn`: counts the calls: each looks at the next of the walls whose weight is at least `FIRM_WEIGHT`.
+    Parameters
+    ----------
+    s
+        Memory.
+    turn : int
+        Counts the calls: each looks at the next of the walls whose weight is at least `FIRM_WEIGHT`.
     """
     room = s[0].room
     known = 0
@@ -104,8 +109,14 @@ def choose_wall(s: StateRecord, turn: int) -> int:
 def count_cuts(s: StateRecord, p: SettingsRecord, k: int, cells: Floats) -> None:
     """Count where the remembered echoes' circles cut a wall's line inside their beams.
 
-    `s`, `p`: memory and settings. `k`: the wall. `cells`, shape (2, LINE_CELLS): counts of the cuts of echoes from
-    near, and of those from afar, updated.
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    k : int
+        The wall.
+    cells : (2, LINE_CELLS) float
+        Counts of the cuts of echoes from near, and of those from afar, updated.
     """
     room = s[0].room
     wall = room.walls[k]
@@ -132,8 +143,14 @@ def count_cuts(s: StateRecord, p: SettingsRecord, k: int, cells: Floats) -> None
 def enter_point_of_line(s: StateRecord, p: SettingsRecord, k: int, along: float, is_near: bool) -> bool:
     """Add a point of a wall's line to the edges, if its remembered echoes show it better than what is known there.
 
-    `s`, `p`: memory, updated, and settings. `k`, `along`: the wall, and the position along it, m. `is_near`: whether
-    an edge is looked for, by echoes from near; else a corner, by those from afar.
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    k, along
+        The wall, and the position along it, m.
+    is_near : bool
+        Whether an edge is looked for, by echoes from near; else a corner, by those from afar.
     """
     room = s[0].room
     wall = room.walls[k]
@@ -275,7 +292,13 @@ def makes_room(room: WallMap, found: RoomCorner, is_near: bool) -> bool:
 
     It may not beside an edge that stays; then none is removed. Nor may it where walls meet, but their corner gets its
     echoes if it has fewer: most were heard before both walls were known.
-    `room`: updated. `found`, `is_near`: the point, and whether it is an edge heard from near.
+
+    Parameters
+    ----------
+    room : WallMap
+        Updated.
+    found, is_near
+        The point, and whether it is an edge heard from near.
     """
     for c in range(CORNERS_MAX):
         corner = room.corners[c]
@@ -299,7 +322,12 @@ def makes_room(room: WallMap, found: RoomCorner, is_near: bool) -> bool:
 def find_heard_points(memory: Memory, p: SettingsRecord, turn: int) -> None:
     """Look for corners and edges on the line of one wall, and add them to the edges.
 
-    `memory`, `p`: updated, and the settings. `turn`: counts the calls: each looks at the next wall.
+    Parameters
+    ----------
+    memory, p
+        Updated, and the settings.
+    turn : int
+        Counts the calls: each looks at the next wall.
     """
     k = choose_wall(memory.s, turn)
     if k < 0:

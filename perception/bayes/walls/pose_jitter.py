@@ -55,7 +55,14 @@ MEAN_SIGMA_M: Final = 0.015
 def find_pull(room: WallMap, q: Reading, p: SettingsRecord, variance: float, pull: Pull) -> None:
     """Write what a reading says of the ring's shift, by the wall that explains it best.
 
-    `variance`: assumed of the shift along each axis, m². `pull`: out.
+    Parameters
+    ----------
+    room, q, p
+        The walls, the reading and the settings.
+    variance : float
+        Assumed of the shift along each axis, m².
+    pull : Pull
+        Out.
     """
     pull.accuracy = 0.0
     if q.range_m >= FAR:
@@ -121,8 +128,13 @@ def weigh_jitters(jitter: PoseJitter, shift: ShiftInformation, pulls: Records[Pu
 
         ½ eᵀ W G (GᵀWG + 1/v)⁻¹ GᵀW e − ½ log det(1 + v GᵀWG)
         Σ ½ w e² h/(1 + h) − ½ log(1 + h)        h = v w |g|²
-    `jitter`: updated. `shift`, `pulls`, `m`: the information of the first `m` readings on the shift, together and of
-    each.
+
+    Parameters
+    ----------
+    jitter : PoseJitter
+        Updated.
+    shift, pulls, m
+        The information of the first `m` readings on the shift, together and of each.
     """
     heard = 0
     for i in range(m):
@@ -152,7 +164,12 @@ def weigh_jitters(jitter: PoseJitter, shift: ShiftInformation, pulls: Records[Pu
 def place_by_others(s: StateRecord, p: SettingsRecord, m: int) -> None:
     """Move each fired reading to where the others of its firing have the ring.
 
-    `s`, `p`: memory, updated, and settings. `m`: number of fired readings, the first of the scratch.
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    m : int
+        Number of fired readings, the first of the scratch.
     """
     room, scratch = s[0].room, s[0].scratch
     jitter, shift, pulls = room.jitter, scratch.shift, scratch.pulls

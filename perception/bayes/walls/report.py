@@ -121,7 +121,13 @@ def is_of_body(segment: tuple[float, ...], bodies: Structured) -> bool:
     """Return whether a segment goes through a round object or is the side of one.
 
     Drums in a row have a line along them, and no wall.
-    `segment`: begins with its ends x, y, x, y, m. `bodies`, shape (n,): the objects.
+
+    Parameters
+    ----------
+    segment : tuple of float
+        Begins with its ends x, y, x, y, m.
+    bodies : (n,) record of `CircleTrack`
+        The objects.
     """
     x1, y1, x2, y2 = segment[:4]
     tx, ty = x2 - x1, y2 - y1
@@ -146,7 +152,12 @@ def _segments(of: Straight) -> Iterator[tuple[float, ...]]:
 def sure_walls(walls: Structured, corners: Structured) -> dict[int, Straight]:
     """Return the walls that are sure, by their number: alone, or as a sure wall's neighbour at a corner.
 
-    `walls`, shape (n,): all walls. `corners`, shape (n,): all corners.
+    Parameters
+    ----------
+    walls : (n,) record of `Wall`
+        All walls.
+    corners : (n,) record of `RoomCorner`
+        All corners.
     """
     found: dict[int, Straight] = {}
     misfit_max = np.where(walls["weight"] < FIRM_WEIGHT, LIGHT_MISFIT_MAX, LINE_MISFIT_MAX)
@@ -177,8 +188,14 @@ def sure_walls(walls: Structured, corners: Structured) -> dict[int, Straight]:
 def sure_spans(spans: Structured, chi2: float, is_proven: bool) -> NDArray[np.bool_]:
     """Return which spans of a wall can be reported: none unless it is a wall, by its best span or by all together.
 
-    `spans`, shape (n,): all spans of the wall. `chi2`: evidence of all together. `is_proven`: whether a corner proves
-    that it is a wall.
+    Parameters
+    ----------
+    spans : (n,) record of `Span`
+        All spans of the wall.
+    chi2 : float
+        Evidence of all together.
+    is_proven : bool
+        Whether a corner proves that it is a wall.
     """
     length, weight, straight = spans["high"] - spans["low"], spans["weight"], spans["chi2"]
     least = SURE_SPAN_WEIGHT if is_proven else WALL_WEIGHT_MIN

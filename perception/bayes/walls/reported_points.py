@@ -66,9 +66,20 @@ def reach_corners(walls: dict[int, Straight], corners: Structured, are_mirrors: 
 
     A corner that is heard is reached from afar; one that is not, only if both walls end near it. Between mirrors only
     an inside corner answers from afar, and elsewhere only an edge: that one is sure whatever is known of its walls.
-    `walls`: the walls by their number; their ends are updated. `corners`, shape (n,): all corners. `are_mirrors`:
-    whether the walls are known to be mirrors.
-    Returned: the corners that are sure, as `CornerPoint` has them.
+
+    Parameters
+    ----------
+    walls : dict of Straight
+        The walls by their number; their ends are updated.
+    corners : (n,) record of `RoomCorner`
+        All corners.
+    are_mirrors : bool
+        Whether the walls are known to be mirrors.
+
+    Returns
+    -------
+    list of tuple
+        The corners that are sure, as `CornerPoint` has them.
     """
     found = []
     for corner in corners[corners["is_used"] == 1]:
@@ -106,9 +117,19 @@ def _ends_at(owner: Straight, edge: Structured, echoes: float) -> bool:
 def end_at_edges(walls: dict[int, Straight], edges: Structured, are_mirrors: bool) -> list[tuple[float, ...]]:
     """Move the ends of walls to the edges that are heard there.
 
-    `walls`: the walls by their number; their ends are updated. `edges`, shape (n,): all edges. `are_mirrors`: whether
-    the walls are known to be mirrors; an edge is heard from near then.
-    Returned: the edges that are sure, as `CornerPoint` has them.
+    Parameters
+    ----------
+    walls : dict of Straight
+        The walls by their number; their ends are updated.
+    edges : (n,) record of `RoomCorner`
+        All edges.
+    are_mirrors : bool
+        Whether the walls are known to be mirrors; an edge is heard from near then.
+
+    Returns
+    -------
+    list of tuple
+        The edges that are sure, as `CornerPoint` has them.
     """
     found = []
     for edge in edges[edges["is_used"] == 1]:

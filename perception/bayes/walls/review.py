@@ -122,7 +122,12 @@ def remember(room: WallMap, sensor: int, q: Reading) -> None:
 def review(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, turn: int) -> None:
     """Review one wall, where slanting walls answer: fit its line, and find how far it goes.
 
-    `s`, `tracks`, `p`: memory, updated, circles and settings. `turn`: counts the calls: each reviews the next wall.
+    Parameters
+    ----------
+    s, tracks, p
+        Memory, updated, circles and settings.
+    turn : int
+        Counts the calls: each reviews the next wall.
     """
     k = next_wall(s[0].room, turn) if edges_answer(s[0].room) else -1
     if k >= 0:
@@ -201,8 +206,12 @@ def stand_by_what_is_forgotten(wall: Wall, evidence: Floats) -> None:
 def end_nat(room: WallMap, wall: Wall, q: Reading, along: float, p: SettingsRecord) -> float:
     """Return half the least χ² of an echo from the ends of a wall's spans in its beam, +inf if it touches a span.
 
-    `room`, `wall`, `q`, `p`: the noise, the wall, the reading and the settings. `along`: where it touches the wall's
-    line, m.
+    Parameters
+    ----------
+    room, wall, q, p
+        The noise, the wall, the reading and the settings.
+    along : float
+        Where it touches the wall's line, m.
     """
     least = math.inf
     if is_on_span(wall, along, 0.0):
@@ -222,8 +231,14 @@ def end_nat(room: WallMap, wall: Wall, q: Reading, along: float, p: SettingsReco
 def is_of_another(room: WallMap, tracks: CircleTracks, q: Reading, p: SettingsRecord, own: int, error: float) -> bool:
     """Return whether another wall or a round object explains an echo as well as wall `own` does.
 
-    `room`, `tracks`, `q`, `p`: the walls, the circles, the echo and the settings. `own`: the wall. `error`: its
-    error, as a share of the greatest explained.
+    Parameters
+    ----------
+    room, tracks, q, p
+        The walls, the circles, the echo and the settings.
+    own : int
+        The wall.
+    error : float
+        Its error, as a share of the greatest explained.
     """
     for k in range(MAX_WALLS):
         wall = room.walls[k]

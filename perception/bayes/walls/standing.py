@@ -35,7 +35,12 @@ STOPPED_RAD: Final = 0.001
 def keep_while_standing(memory: Memory, pose: RingPose) -> None:
     """Mark what is sure when the robot stops, and remove the marks when it moves on.
 
-    `memory`: updated. `pose`: of a firing whose readings are not in the memory yet.
+    Parameters
+    ----------
+    memory : Memory
+        Updated.
+    pose : RingPose
+        Of a firing whose readings are not in the memory yet.
     """
     if has_just_stopped(memory.s, pose):
         mark_sure(memory)
@@ -45,7 +50,12 @@ def keep_while_standing(memory: Memory, pose: RingPose) -> None:
 def has_just_stopped(s: StateRecord, pose: RingPose) -> bool:
     """Return whether the robot has stopped since the last firing; when it moves on, remove the marks.
 
-    `s`, shape (1,): updated. `pose`: as of `keep_while_standing`.
+    Parameters
+    ----------
+    s : (1,) State
+        Updated.
+    pose : RingPose
+        As of `keep_while_standing`.
     """
     x, y, yaw = pose
     if not (abs(x) < COORDINATE_MAX_M and abs(y) < COORDINATE_MAX_M and math.isfinite(yaw)):

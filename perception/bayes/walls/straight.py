@@ -117,9 +117,17 @@ def reported_line(wall: Structured) -> tuple[float, ...]:
 def straighten(walls: dict[int, Straight], corners: Structured, edges: Structured) -> tuple[Structured, Structured]:
     """Fit the walls and the corners that are heard together.
 
-    `walls`: the walls by their number; their lines are updated. `corners`, `edges`, shape (n,): all corners and
-    edges.
-    Returned: the corners and the edges, with their corrected places.
+    Parameters
+    ----------
+    walls : dict of Straight
+        The walls by their number; their lines are updated.
+    corners, edges : (n,) record of `RoomCorner`
+        All corners and edges.
+
+    Returns
+    -------
+    tuple of (n,) record of `RoomCorner`
+        The corners and the edges, with their corrected places.
     """
     points = np.concatenate([corners, edges])
     ends = points[len(corners) :]["second"].copy()

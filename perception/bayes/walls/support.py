@@ -56,8 +56,14 @@ def weigh(
 ) -> None:
     """Write the weight of each reading for or against a line; see `support`, and `contact.touch` for a line.
 
-    `near`, `n`, `wall`, `p`, `base`: as for `support`; the weights are written. `edges`: whether slanting walls
-    answer from the beam's edge. `variance_m2`, `relative`: the noise, as `contact.range_sigma` takes it.
+    Parameters
+    ----------
+    near, n, wall, p, base
+        As for `support`; the weights are written.
+    edges : bool
+        Whether slanting walls answer from the beam's edge.
+    variance_m2, relative : float
+        The noise, as `contact.range_sigma` takes it.
     """
     nx, ny, ox, oy, offset = wall.normal_x, wall.normal_y, wall.origin_x, wall.origin_y, wall.offset
     cosine, sine, must = p[0].cos_half_angle, p[0].sin_half_angle, p[0].cos_must_answer

@@ -90,8 +90,12 @@ EDGES_COUNTED_MAX: Final = 400.0
 def weaken(room: WallMap, tracks: CircleTracks, q: Reading, own: int, p: SettingsRecord) -> None:
     """Weaken the walls that a reading passed through, and count whether slanting walls answer.
 
-    `room`, `tracks`, `q`, `p`: the walls, updated, the circles, what lies behind which is not seen, the reading and
-    the settings. `own`: the wall that explains it, −1 if none does.
+    Parameters
+    ----------
+    room, tracks, q, p
+        The walls, updated, the circles, what lies behind which is not seen, the reading and the settings.
+    own : int
+        The wall that explains it, −1 if none does.
     """
     for k in range(MAX_WALLS):
         wall = room.walls[k]
@@ -166,7 +170,12 @@ def is_from_any_end(room: WallMap, q: Reading, p: SettingsRecord) -> bool:
 def keep_recent(room: WallMap, sensor: int, q: Reading, is_free: int) -> int:
     """Remember a reading if its sensor has moved far enough; return its place, or −1.
 
-    `room`, `sensor`, `q`: the memory, updated, the sensor and its reading. `is_free`: as in `RecentReading`.
+    Parameters
+    ----------
+    room, sensor, q
+        The memory, updated, the sensor and its reading.
+    is_free : int
+        As in `RecentReading`.
     """
     is_first = room.kept[sensor] == 0.0
     spacing = RECENT_SPACING_M if is_free == IS_FREE else KNOWN_SPACING_M
@@ -220,8 +229,12 @@ def explain(room: WallMap, q: Reading, p: SettingsRecord, is_known: bool) -> tup
 def enter_firing(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int) -> int:
     """Enter a firing's readings; return the place of a recent echo that nothing explains, or −1.
 
-    `s`, `tracks`, `p`: memory, updated, circles and settings; echoes that a named object explains support no wall.
-    `m`: readings of this firing.
+    Parameters
+    ----------
+    s, tracks, p
+        Memory, updated, circles and settings; echoes that a named object explains support no wall.
+    m : int
+        Readings of this firing.
     """
     room = s[0].room
     scratch = s[0].scratch

@@ -93,7 +93,10 @@ class LandmarkPlace(NamedTuple):
 class DriftCorrection:
     """The landmark filter of one run.
 
-    `ring`: the sensors.
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
     """
 
     BOUNDS: Final = bounds(
@@ -175,7 +178,10 @@ class DriftCorrection:
     def learn(self, seen: Iterable[SeenObject]) -> None:
         """Make landmarks of recognised objects that are none yet; drop those that are no longer recognised.
 
-        `seen`: near the robot. A landmark beyond the sensors' range stays: perception has archived its object.
+        Parameters
+        ----------
+        seen : iterable of SeenObject
+            Near the robot. A landmark beyond the sensors' range stays: perception has archived its object.
         """
         objects = {one.number: one for one in seen}
         if self._has_started and self._arrived > self._tracker.entered:
@@ -257,8 +263,12 @@ class DriftCorrection:
     def moved_landmarks(self, least_m: float, among: Container[int]) -> list[tuple[int, float, float]]:
         """Return number and displacement (m) of each landmark that moved so far since it was last returned.
 
-        `least_m`: least displacement, m. `among`: numbers of the objects that perception can move: those that it has
-        not archived.
+        Parameters
+        ----------
+        least_m : float
+            Least displacement, m.
+        among : container of int
+            Numbers of the objects that perception can move: those that it has not archived.
         """
         moved = []
         columns = self._tracker.landmarks("number", "x", "y", "anchor_x", "anchor_y")

@@ -139,7 +139,10 @@ def compare_firing(
 class DriftEvidence:
     """The filter that takes odometry as exact, and what the readings say against it.
 
-    `ring`: the sensors.
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
     """
 
     def __init__(self, ring: RingConfig) -> None:
@@ -156,7 +159,12 @@ class DriftEvidence:
     def enter(self, row: Floats, drifting: LandmarkTracker) -> None:
         """Enter a firing into both filters, and compare what they predict.
 
-        `row`, shape (POSE + sensors,): as `LandmarkTracker` takes it. `drifting`: the filter with drift.
+        Parameters
+        ----------
+        row : (POSE + sensors,) float
+            As `LandmarkTracker` takes it.
+        drifting : LandmarkTracker
+            The filter with drift.
         """
         drifting.move(row)
         if self.is_refuted:

@@ -97,8 +97,14 @@ class _Branch(NamedTuple):
 def find_displacement(echoes: Sequence[Echo], discs: Sequence[Disc], half_angle: float) -> Displacement | None:
     """Return the displacement by which most echoes fit landmarks jointly; None if none fits enough, or two differ.
 
-    `echoes`: of one cycle of the ring; the nearest `PAIRED_ECHOES_MAX` are used. `discs`: the landmarks.
-    `half_angle`: half the beam's width, rad.
+    Parameters
+    ----------
+    echoes : sequence of Echo
+        Of one cycle of the ring; the nearest `PAIRED_ECHOES_MAX` are used.
+    discs : sequence of Disc
+        The landmarks.
+    half_angle : float
+        Half the beam's width, rad.
     """
     nearest = _nearest(echoes)
     least = max(PAIRS_MIN, math.ceil(PAIRED_SHARE * len(nearest)))
@@ -133,8 +139,18 @@ def share_improved(found: Displacement, echoes: Sequence[Echo], discs: Sequence[
 
     After a slip that is most of them; where only some landmarks have moved, a displacement may fit these a little
     better, and the others no better.
-    `found`: of these echoes and landmarks. `echoes`, `discs`, `half_angle`: as for `find_displacement`.
-    Returned: as a share of the paired landmarks.
+
+    Parameters
+    ----------
+    found : Displacement
+        Of these echoes and landmarks.
+    echoes, discs, half_angle
+        As for `find_displacement`.
+
+    Returns
+    -------
+    float
+        As a share of the paired landmarks.
     """
     nearest = _nearest(echoes)
     gains: dict[int, float] = {}

@@ -59,7 +59,12 @@ def add_row(covariance: Floats, n: int, target: int, source: int, factor: float)
 def write_lever(e: EstimateRecord, lever: Floats) -> None:
     """Write how the error of each row changes with an error of the ring's turn: 1 for the heading, −J p̂ for a place.
 
-    `e`, shape (1,): the mean. `lever`, shape (rows,): out.
+    Parameters
+    ----------
+    e : (1,) Estimate
+        The mean.
+    lever : (rows,) float
+        Out.
     """
     est = e[0]
     for k in range(FIRST):
@@ -201,8 +206,14 @@ def innovation_variance(
 def correct(e: EstimateRecord, covariance: Floats, innovation: float, variance: float) -> None:
     """Correct mean and covariance by one scalar measurement.
 
-    `e`, shape (1,): updated; its `gain` holds P Hᵀ. `covariance`, shape (rows, rows): updated. `innovation`,
-    `variance`: measured less predicted value, and its variance, noise included.
+    Parameters
+    ----------
+    e : (1,) Estimate
+        Updated; its `gain` holds P Hᵀ.
+    covariance : (rows, rows) float
+        Updated.
+    innovation, variance : float
+        Measured less predicted value, and its variance, noise included.
     """
     est = e[0]
     n = rows_used(e)
@@ -268,7 +279,14 @@ def add_landmark(
 def remove_landmark(e: EstimateRecord, covariance: Floats, i: int) -> None:
     """Remove a landmark; the last one takes its place.
 
-    `e`, shape (1,): updated. `covariance`, shape (rows, rows): updated. `i`: index of the landmark.
+    Parameters
+    ----------
+    e : (1,) Estimate
+        Updated.
+    covariance : (rows, rows) float
+        Updated.
+    i : int
+        Index of the landmark.
     """
     est = e[0]
     last = est.count - 1

@@ -72,7 +72,14 @@ def has_moved_since(last: LastUse, x: float, y: float, axis: float) -> bool:
 def has_moved(e: EstimateRecord, i: int, x: float, y: float, axis: float) -> bool:
     """Return whether a sensor has moved or turned enough since its last reading that was used; note its place.
 
-    `e`, shape (1,): updated. `i`: the sensor. `x`, `y`, `axis`: its place (m) and direction (rad) by odometry.
+    Parameters
+    ----------
+    e : (1,) Estimate
+        Updated.
+    i : int
+        The sensor.
+    x, y, axis : float
+        Its place (m) and direction (rad) by odometry.
     """
     last = e[0].sensors[i]
     if not has_moved_since(last, x, y, axis):
@@ -85,8 +92,14 @@ def has_moved(e: EstimateRecord, i: int, x: float, y: float, axis: float) -> boo
 def learn_stray(e: EstimateRecord, inside: float, chance: float) -> None:
     """Renew the share of landmarks outside a beam that are heard, by one look, as far as that landmark was outside.
 
-    `e`, shape (1,): updated. `inside`: probability that the landmark is inside the beam, before the look. `chance`:
-    as for `update_with_edge`.
+    Parameters
+    ----------
+    e : (1,) Estimate
+        Updated.
+    inside : float
+        Probability that the landmark is inside the beam, before the look.
+    chance : float
+        As for `update_with_edge`.
     """
     est = e[0]
     outside = 1.0 - inside
@@ -175,8 +188,12 @@ def correct_with_range(
 ) -> None:
     """Correct the estimate with a range that one landmark explains, and learn the ranges' noise from it.
 
-    `best`, `best_nis`: the landmark, and the square of its distance in standard deviations, as of `associate`. `e`,
-    `covariance`, `mount`, `r`, `sonar`: as for `update_with_range`.
+    Parameters
+    ----------
+    best, best_nis
+        The landmark, and the square of its distance in standard deviations, as of `associate`.
+    e, covariance, mount, r, sonar
+        As for `update_with_range`.
     """
     mx, my, axis = mount
     est = e[0]

@@ -74,8 +74,13 @@ class LandmarkTracker:
 
     A firing is a row of numbers: the pose of the base by odometry (m, rad), the ring's direction (rad), and the range
     of each sensor (m).
-    `ring`: the sensors. `is_exact`: whether odometry is taken as exact: only landmarks and the ranges' scale are
-    found then.
+
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    is_exact : bool
+        Whether odometry is taken as exact: only landmarks and the ranges' scale are found then.
 
     Attributes
     ----------
@@ -199,8 +204,12 @@ class LandmarkTracker:
     def displace(self, by: Pose, covariance: Floats) -> None:
         """Move the ring without odometry.
 
-        `by`: its true pose as seen from the believed one. `covariance`, shape (3, 3): of that: x, y (m) and turn
-        (rad).
+        Parameters
+        ----------
+        by : Pose
+            Its true pose as seen from the believed one.
+        covariance : (3, 3) float
+            Of that: x, y (m) and turn (rad).
         """
         e = self.e[0]
         c, s = math.cos(e.heading), math.sin(e.heading)
@@ -277,7 +286,10 @@ class LandmarkTracker:
 def fit_of_turn(landmarks: Floats) -> Floats:
     """Return the weights of the landmarks' errors in the best turn of them all against the ring.
 
-    `landmarks`, shape (count, 2): their places, m.
+    Parameters
+    ----------
+    landmarks : (count, 2) float
+        Their places, m.
 
     Returns
     -------

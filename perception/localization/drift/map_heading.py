@@ -46,7 +46,10 @@ FITTED_TIMES: Final = 3
 class MapHeading:
     """The second filter.
 
-    `ring`: the sensors.
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
 
     Attributes
     ----------
@@ -96,7 +99,12 @@ class MapHeading:
     def renew(self, known: LandmarkTracker, way_m: float) -> None:
         """Do a part of the work after a firing; at its end, set `motion` and the covariance of the first filter.
 
-        `known`: the first filter; its covariance becomes one about the map after `motion`. `way_m`: way driven, m.
+        Parameters
+        ----------
+        known : LandmarkTracker
+            The first filter; its covariance becomes one about the map after `motion`.
+        way_m : float
+            Way driven, m.
         """
         if known.is_synchro:  # the ring of a synchro drive keeps its direction: the heading is known
             return
@@ -163,7 +171,10 @@ class MapHeading:
     def _moving(self, landmarks: Floats) -> Floats:
         """Return how the errors of all rows change with a turn of map and ring about the start, and with a shift.
 
-        `landmarks`, shape (count, 2): their places, m.
+        Parameters
+        ----------
+        landmarks : (count, 2) float
+            Their places, m.
 
         Returns
         -------
@@ -188,7 +199,11 @@ def place_errors(landmarks: Floats) -> Floats:
     """Return how the landmarks' places err with the errors of all rows.
 
     A landmark's row is relative to the ring's heading: a true place is p = R(δθ) p̂ + δp, to first order.
-    `landmarks`, shape (count, 2): their places, m.
+
+    Parameters
+    ----------
+    landmarks : (count, 2) float
+        Their places, m.
 
     Returns
     -------
@@ -210,8 +225,13 @@ def fit_of_motion(covariance: Floats, moving: Floats) -> tuple[Floats, Floats]:
     """Return the weights of places' errors in the most likely common motion, and that motion's covariance.
 
     It is the generalised least squares of A. C. Aitken (1935): what it leaves of the errors is independent of it.
-    `covariance`, shape (2 n, 2 n): W, of the errors, m². `moving`, shape (2 n, 3): M, how a turn about the start and
-    a shift change the places.
+
+    Parameters
+    ----------
+    covariance : (2 n, 2 n) float
+        W, of the errors, m².
+    moving : (2 n, 3) float
+        M, how a turn about the start and a shift change the places.
 
     Returns
     -------
@@ -228,8 +248,12 @@ def fit_of_motion(covariance: Floats, moving: Floats) -> tuple[Floats, Floats]:
 def without_motion(covariance: Floats, weights: Floats, moving: Floats) -> Floats:
     """Return the covariance of what is left when the fitted motion is taken out of all rows.
 
-    `covariance`, shape (rows, rows): P. `weights`, `moving`, shape (rows, 3): C and G, of which CᵀG = I: the result
-    is (I − G Cᵀ) P (I − G Cᵀ)ᵀ.
+    Parameters
+    ----------
+    covariance : (rows, rows) float
+        P.
+    weights, moving : (rows, 3) float
+        C and G, of which CᵀG = I: the result is (I − G Cᵀ) P (I − G Cᵀ)ᵀ.
     """
     carried = covariance @ weights
     across = moving @ carried.T
@@ -240,7 +264,12 @@ def without_motion(covariance: Floats, weights: Floats, moving: Floats) -> Float
 def motion_between(before: Floats, after: Floats, weights: Floats) -> Floats:
     """Return the motion from places to places, relative to the start: turn (rad) and shift (m).
 
-    `before`, `after`, shape (n, 2): m. `weights`, shape (2 n, 3): as from `fit_of_motion`.
+    Parameters
+    ----------
+    before, after : (n, 2) float
+        m.
+    weights : (2 n, 3) float
+        As from `fit_of_motion`.
     """
     motion = np.zeros(3)
     for _ in range(FITTED_TIMES):

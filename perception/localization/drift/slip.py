@@ -72,8 +72,15 @@ def find_slip(tracker: LandmarkTracker, echoes: list[Echo], half_angle: float, r
     """Return how the ring is displaced from where the filter believes it is; None where that remains unknown.
 
     Where most landmarks fit as well without a displacement, that is the identity: the robot did not slip.
-    `tracker`: the filter. `echoes`: of one cycle. `half_angle`, `reach_m`: half the beam's width (rad); landmarks
-    farther than this do not answer (m).
+
+    Parameters
+    ----------
+    tracker : LandmarkTracker
+        The filter.
+    echoes : list of Echo
+        Of one cycle.
+    half_angle, reach_m : float
+        Half the beam's width (rad); landmarks farther than this do not answer (m).
     """
     e = tracker.e[0]
     here = Pose(e.x, e.y, e.heading).inverse()

@@ -23,8 +23,12 @@ LEAST_GAIN: Final = 1e-4
 class WalkRates:
     """The bank.
 
-    `rates`, shape (n,): variances per metre, ascending. `prior`, shape (n,): their probabilities before anything is
-    known.
+    Parameters
+    ----------
+    rates : (n,) float
+        Variances per metre, ascending.
+    prior : (n,) float
+        Their probabilities before anything is known.
 
     Attributes
     ----------
@@ -61,8 +65,14 @@ class WalkRates:
     def enter(self, correction: float, before: float, after: float, way: float) -> None:
         """Enter what the main filter, which assumes `rate`, made of a way.
 
-        `correction`: the sum of its corrections of the value. `before`, `after`: its variance of the value at the
-        way's begin and end. `way`: m.
+        Parameters
+        ----------
+        correction : float
+            The sum of its corrections of the value.
+        before, after : float
+            Its variance of the value at the way's begin and end.
+        way : float
+            m.
         """
         predicted = before + self.rate * way
         self._variances += self._rates * way

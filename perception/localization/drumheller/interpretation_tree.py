@@ -55,7 +55,12 @@ class _Sides(NamedTuple):
 def interpretations(segments: Sequence[ContourSegment], room: Room) -> tuple[Interpretation, ...]:
     """Return the poses that the leaves of the tree give: most assigned segments first.
 
-    `segments`: those that enter the tree; each is a level. `room`: the walls.
+    Parameters
+    ----------
+    segments : sequence of ContourSegment
+        Those that enter the tree; each is a level.
+    room : Room
+        The walls.
     """
     sides = _sides(room)
     allowed = _binary_masks(segments, sides)
@@ -129,8 +134,17 @@ def _pose(chosen: Sequence[tuple[ContourSegment, int]], sides: _Sides) -> Interp
 def poses_along_walls(segments: Sequence[ContourSegment], room: Room) -> Floats:
     """Return poses from which one segment is on one wall: what remains where the tree finds no two walls.
 
-    `segments`: each is put on each side of each wall that is long enough. `room`: the walls.
-    Returned, shape (n, 3): x, y (m), heading (rad): the middle of the segment is at each `SLIDE_M` of the wall.
+    Parameters
+    ----------
+    segments : sequence of ContourSegment
+        Each is put on each side of each wall that is long enough.
+    room : Room
+        The walls.
+
+    Returns
+    -------
+    (n, 3) float
+        x, y (m), heading (rad): the middle of the segment is at each `SLIDE_M` of the wall.
     """
     sides = _sides(room)
     rows = [np.empty((0, 3))]

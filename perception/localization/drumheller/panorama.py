@@ -31,7 +31,13 @@ def panoramas(firings: Sequence[Firing], ring: RingConfig) -> tuple[Panorama, ..
 
     A panorama ends where a sensor fires again. Odometry compounds the firings: all panoramas are in the frame of the
     ring at the last firing, x along its sensor 0.
-    `firings`: at least one; poses in odometry's frame. `ring`: places of the sensors.
+
+    Parameters
+    ----------
+    firings : sequence of Firing
+        At least one; poses in odometry's frame.
+    ring : RingConfig
+        Places of the sensors.
     """
     mounts = np.array(ring.mounts)
     last = Pose(firings[-1].pose.x, firings[-1].pose.y, firings[-1].ring_yaw).inverse()

@@ -51,8 +51,12 @@ class FittedPoses(NamedTuple):
 def beams_at(panorama: Panorama, x: Floats, y: Floats, theta: Floats) -> Beams:
     """Return the sensors of a panorama in the map frame, shape (poses, n).
 
-    `panorama`: the sensors in the ring's frame. `x`, `y`, `theta`, shape (poses,): the ring's poses in the map frame,
-    m and rad.
+    Parameters
+    ----------
+    panorama : Panorama
+        The sensors in the ring's frame.
+    x, y, theta : (poses,) float
+        The ring's poses in the map frame, m and rad.
     """
     cos, sin = np.cos(theta)[:, None], np.sin(theta)[:, None]
     return Beams(

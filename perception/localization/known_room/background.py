@@ -33,8 +33,14 @@ HEARD_SHARE_MIN: Final = 0.1
 class Background:
     """How likely ranges are without a place.
 
-    `room`: the surfaces. `surroundings`: of this room. `clear_m`: the ring's centre is farther than this from any
-    surface, m.
+    Parameters
+    ----------
+    room : Room
+        The surfaces.
+    surroundings : Surroundings
+        Of this room.
+    clear_m : float
+        The ring's centre is farther than this from any surface, m.
     """
 
     SCRATCH: Final = ("_densities", "_window_m")
@@ -60,7 +66,12 @@ class Background:
     def log_ratio(self, ranges_m: Floats, shares: LearnedShares) -> float:
         """Return the log likelihood ratio of readings without a place to evenly distributed ones, nat.
 
-        `ranges_m`, shape (n,): of a keyframe, m; inf for silence. `shares`: how often a reading has which cause.
+        Parameters
+        ----------
+        ranges_m : (n,) float
+            Of a keyframe, m; inf for silence.
+        shares : LearnedShares
+            How often a reading has which cause.
         """
         cone, mirror, late = self._densities
         share = shares.records[0]

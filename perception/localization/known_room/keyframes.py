@@ -28,7 +28,10 @@ KEYFRAMES_MAX: Final = 128
 class Keyframes:
     """The last keyframes of a run, each under its number modulo `KEYFRAMES_MAX`.
 
-    `mounts`, shape (n, 3): place (m) and direction (rad) of each sensor in the ring's frame.
+    Parameters
+    ----------
+    mounts : (n, 3) float
+        Place (m) and direction (rad) of each sensor in the ring's frame.
     """
 
     SCRATCH: Final = ("_axes",)
@@ -127,8 +130,12 @@ class Keyframes:
     def compounded(self, first: int, most: int) -> Floats:
         """Return readings of all keyframes from one on, in the frame of that one.
 
-        `first`: number of that keyframe, which must still be kept. `most`: so many readings are chosen at most,
-        evenly.
+        Parameters
+        ----------
+        first : int
+            Number of that keyframe, which must still be kept.
+        most : int
+            So many readings are chosen at most, evenly.
 
         Returns
         -------

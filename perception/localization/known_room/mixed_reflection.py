@@ -132,8 +132,14 @@ def range_variance(sensor: Records[SensorModel], range_m: float) -> float:
 def echo_density(sensor: Records[SensorModel], measured: float, expected: float, variance: float) -> float:
     """Return the density (1/m) of an echo that a surface in the map sends, or the probability of silence.
 
-    `sensor`, shape (1,): errors of a range. `measured`, `expected`: ranges, m; inf for silence, which no expectation
-    may be. `variance`: of the expected range, from the pose's, m².
+    Parameters
+    ----------
+    sensor : (1,) SensorModel
+        Errors of a range.
+    measured, expected : float
+        Ranges, m; inf for silence, which no expectation may be.
+    variance : float
+        Of the expected range, from the pose's, m².
     """
     if measured == math.inf:
         return sensor[0].dropout

@@ -202,8 +202,14 @@ def offer_peaks(
 class PoseGrid:
     """The table of one room, and a search in it.
 
-    `room`: the surfaces. `surroundings`: of this room. `clear_m`: the ring's centre is farther than this from any
-    surface, m.
+    Parameters
+    ----------
+    room : Room
+        The surfaces.
+    surroundings : Surroundings
+        Of this room.
+    clear_m : float
+        The ring's centre is farther than this from any surface, m.
     """
 
     SCRATCH: Final = ("_origin", "_table", "_free", "_filled", "_scratch", "_likely", "_likely_search", "starts")
@@ -305,8 +311,15 @@ class PoseGrid:
     def best_starts(self, most: int) -> Floats:
         """Return the poses that fit best, the best first, without those that fit much worse.
 
-        `most`: so many at most.
-        Returned, shape (n, 3): x, y (m), heading (rad).
+        Parameters
+        ----------
+        most : int
+            So many at most.
+
+        Returns
+        -------
+        (n, 3) float
+            x, y (m), heading (rad).
         """
         found = self._found["starts"][0, : len(self)]
         order = np.argsort(-found["score"], kind="stable")[:most]

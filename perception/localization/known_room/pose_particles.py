@@ -135,8 +135,14 @@ def add_hypothesis(
 ) -> None:
     """Add a hypothesis around a pose of the ring; where there are too many already, do nothing.
 
-    `of`, shape (1,): updated. `x`, `y`, `heading`: the pose, m and rad. `place_sigma_m`, `heading_half_rad`: standard
-    deviation of the place; half the width of the row of headings.
+    Parameters
+    ----------
+    of : (1,) Hypotheses
+        Updated.
+    x, y, heading : float
+        The pose, m and rad.
+    place_sigma_m, heading_half_rad : float
+        Standard deviation of the place; half the width of the row of headings.
     """
     count = of[0].count
     if count == HYPOTHESES_MAX:
@@ -158,8 +164,15 @@ def move(of: HypothesesRecord, forward_m: float, left_m: float, turn_rad: float,
     """Follow odometry: a displacement in the ring's frame before it, and a turn of the ring.
 
     All hypotheses take the same random numbers, so that chance does not decide between two that are alike.
-    `of`, shape (1,): updated. `forward_m`, `left_m`, `turn_rad`: by odometry. `noise`, shape (HEADINGS,): from the
-    standard normal distribution.
+
+    Parameters
+    ----------
+    of : (1,) Hypotheses
+        Updated.
+    forward_m, left_m, turn_rad : float
+        By odometry.
+    noise : (HEADINGS,) float
+        From the standard normal distribution.
     """
     way = math.hypot(forward_m, left_m)
     turn_sigma = TURN_SHARE * turn_rad

@@ -44,7 +44,12 @@ class Starts(Record):
 def offer(to: Records[Starts], x: float, y: float, heading: float, score: float, profile: int) -> None:
     """Add a start, unless a better one is near it or all are better; it replaces a worse one near it.
 
-    `to`, shape (1,): updated. `x`, `y`, `heading`, `score`, `profile`: as of `Start`.
+    Parameters
+    ----------
+    to : (1,) Starts
+        Updated.
+    x, y, heading, score, profile : float, int
+        As of `Start`.
     """
     if score <= to[0].least:
         return

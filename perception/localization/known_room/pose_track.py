@@ -73,8 +73,14 @@ def heading_noise(seed: int) -> Floats:
 class PoseTrack:
     """The hypotheses and their progress through the keyframes.
 
-    `surroundings`: of the room. `background`: how likely the readings are without a place. `noise`, shape (NOISES,
-    HEADINGS): from `heading_noise`.
+    Parameters
+    ----------
+    surroundings : Surroundings
+        Of the room.
+    background : Background
+        How likely the readings are without a place.
+    noise : (NOISES, HEADINGS) float
+        From `heading_noise`.
 
     Attributes
     ----------
@@ -180,8 +186,14 @@ class PoseTrack:
     def enter(self, keyframes: Keyframes, shares: LearnedShares, least_log: float = LEAST_LOG) -> int:
         """Do a quantum of entering the next keyframe; return its readings if it is done, otherwise 0.
 
-        `keyframes`: all. `shares`: how often a reading has which cause. `least_log`: hypotheses less likely than the
-        best by more than this are dropped, nat.
+        Parameters
+        ----------
+        keyframes : Keyframes
+            All.
+        shares : LearnedShares
+            How often a reading has which cause.
+        least_log : float
+            Hypotheses less likely than the best by more than this are dropped, nat.
         """
         if self._step == 0:
             self.entered = max(self.entered, keyframes.count - KEYFRAMES_MAX)

@@ -31,9 +31,18 @@ class Bins(Record):
 def make_index(room: Room, window_m: float) -> tuple[Structured, Ints, Ints]:
     """Return the index of a room's surfaces.
 
-    `room`: the surfaces. `window_m`: greatest range of a sensor, m.
-    Returned: bins, starts and items: the surfaces of one kind in one bin are the items from start k to before start k
-    + 1, where k is (kind · columns + column) · rows + row.
+    Parameters
+    ----------
+    room : Room
+        The surfaces.
+    window_m : float
+        Greatest range of a sensor, m.
+
+    Returns
+    -------
+    ((1,) Bins, (m,) int, (n,) int)
+        Bins, starts and items: the surfaces of one kind in one bin are the items from start k to before start k + 1,
+        where k is (kind · columns + column) · rows + row.
     """
     low, high = room.bounds
     columns, rows = (max(1, math.ceil(side / INDEX_BIN_M)) for side in (high - low).tolist())

@@ -106,7 +106,14 @@ class Surroundings(NamedTuple):
 def make_surroundings(room: Room, model: RangeModel, half_angle: float) -> Surroundings:
     """Return the surfaces of a room as kernels take them, with nothing near yet.
 
-    `room`: the surfaces. `model`: errors of a range. `half_angle`: half the beam's opening, rad.
+    Parameters
+    ----------
+    room : Room
+        The surfaces.
+    model : RangeModel
+        Errors of a range.
+    half_angle : float
+        Half the beam's opening, rad.
     """
     walls, corners = zeros(Wall, len(room.walls)), zeros(Corner, len(room.corners))
     circles = zeros(Circle, len(room.circles))
@@ -157,7 +164,14 @@ def insert_nearest(indices: Ints, distances: Floats, count: int, index: int, dis
 def look_around(s: Surroundings, x: float, y: float, within_m: float) -> None:
     """Find the surfaces that sensors near a place can hear.
 
-    `s`: its `near` is updated. `x`, `y`: the place, m. `within_m`: greatest distance of a sensor from it, m.
+    Parameters
+    ----------
+    s : Surroundings
+        Its `near` is updated.
+    x, y : float
+        The place, m.
+    within_m : float
+        Greatest distance of a sensor from it, m.
     """
     near, reach = s.near[0], within_m + s.sensor[0].window_m
     near.x, near.y = x, y
@@ -197,7 +211,12 @@ def look_around(s: Surroundings, x: float, y: float, within_m: float) -> None:
 def way_into(circle_x: float, circle_y: float, radius: float, ux: float, uy: float) -> float:
     """Return how far a ray along a unit vector runs until it enters a circle, m; inf if never.
 
-    `circle_x`, `circle_y`, `radius`: the circle, relative to the ray's begin, m. `ux`, `uy`: the vector.
+    Parameters
+    ----------
+    circle_x, circle_y, radius : float
+        The circle, relative to the ray's begin, m.
+    ux, uy : float
+        The vector.
     """
     off = circle_x * uy - circle_y * ux
     if abs(off) >= radius:
@@ -237,8 +256,17 @@ def is_surface_hidden(s: Surroundings, x: float, y: float, dx: float, dy: float)
 def expect_cone(s: Surroundings, x: float, y: float, cos: float, sin: float) -> tuple[float, float, float]:
     """Return the distance (m) of the nearest point in a beam, and its derivative by the sensor's x and y.
 
-    `s`: of a place near the sensor. `x`, `y`, `cos`, `sin`: the sensor's place, m, and axis.
-    Returned: inf, 0, 0 for silence.
+    Parameters
+    ----------
+    s : Surroundings
+        Of a place near the sensor.
+    x, y, cos, sin : float
+        The sensor's place, m, and axis.
+
+    Returns
+    -------
+    tuple of float
+        inf, 0, 0 for silence.
     """
     near, slope = s.near[0], s.sensor[0].tan_half
     off = math.hypot(x - near.x, y - near.y)

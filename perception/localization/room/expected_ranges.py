@@ -73,8 +73,14 @@ def expected_ranges(room: Room, beams: Beams, half_angle: float, reflection: Ref
 def crossed(room: Room, x: Floats, y: Floats, to_x: Floats, to_y: Floats, slack: float) -> NDArray[np.bool_]:
     """Return which lines of sight cross a surface.
 
-    `room`: the surfaces. `x`, `y`, `to_x`, `to_y`, shape (n,): beginning and end of each line, m. `slack`: a surface
-    crossed nearer than this to the end does not count, m.
+    Parameters
+    ----------
+    room : Room
+        The surfaces.
+    x, y, to_x, to_y : (n,) float
+        Beginning and end of each line, m.
+    slack : float
+        A surface crossed nearer than this to the end does not count, m.
     """
     dx, dy = to_x - x, to_y - y
     length = np.hypot(dx, dy)
@@ -188,9 +194,18 @@ def _nearer(one: Expected, other: Expected) -> Expected:
 def mirror_points(room: Room, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the points that reflect sound back to some places, whatever hides them.
 
-    `room`: the surfaces. `x`, `y`, shape (n,): places, m.
-    Returned: each point from the place, dx and dy, and its distance, m, shape (n, walls + corners + circles); the
-    distance is inf where the wall, corner or circle reflects nothing back.
+    Parameters
+    ----------
+    room : Room
+        The surfaces.
+    x, y : (n,) float
+        Places, m.
+
+    Returns
+    -------
+    (float, float, float)
+        Each point from the place, dx and dy, and its distance, m, shape (n, walls + corners + circles); the distance
+        is inf where the wall, corner or circle reflects nothing back.
     """
     x, y = x[:, None], y[:, None]
     height = room.offsets - room.normals[:, 0] * x - room.normals[:, 1] * y

@@ -51,10 +51,17 @@ class RangeModel:
 def log_ratio(model: RangeModel, measured: Floats, expected: Floats) -> tuple[Floats, Floats]:
     """Return each reading's log likelihood ratio to a reading from anywhere (nat), and the probability that it fits.
 
-    `model`: errors. `measured`, `expected`: ranges, m, arrays of shapes that broadcast; inf for silence. An expected
-    range beyond the window is silence.
-    Returned: the log ratio; and the probability that a heard echo is the expected one (0 for silence): the weight in
-    a fit.
+    Parameters
+    ----------
+    model : RangeModel
+        Errors.
+    measured, expected : float
+        Ranges, m, arrays of shapes that broadcast; inf for silence. An expected range beyond the window is silence.
+
+    Returns
+    -------
+    (float, float)
+        The log ratio; and the probability that a heard echo is the expected one (0 for silence): the weight in a fit.
     """
     heard, answers = np.isfinite(measured), expected <= model.window_m
     both = heard & answers
@@ -72,7 +79,13 @@ def log_ratio_of_true_pose(model: RangeModel, measured: Floats) -> tuple[float, 
     """Return mean and standard deviation (nat) of the summed `log_ratio` that a true pose has with these readings.
 
     Each reading is as expected, or with the probability of drop-outs and outliers it is not.
-    `model`: errors. `measured`, shape (n,): ranges, m; inf for silence.
+
+    Parameters
+    ----------
+    model : RangeModel
+        Errors.
+    measured : (n,) float
+        Ranges, m; inf for silence.
     """
     heard = np.isfinite(measured)
     typical = model.peak(model.sigma(measured)) * math.exp(-0.5) + model.outliers / model.window_m

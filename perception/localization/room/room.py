@@ -52,10 +52,18 @@ class Room:
 def make_room(walls: Floats, circles: Floats | None = None) -> Room:
     """Return the room with these walls and round objects.
 
-    `walls`, shape (w, 4): both ends of each wall, m. Walls that cross should be split at the crossing; otherwise it
-    is no corner. `circles`, shape (k, 3): centre and radius of each round object, m.
-    Raises `ValueError`: an array has another shape, there is no row at all, a value is not finite, a radius is not
-    positive, or a wall is shorter than `JOIN_M`.
+    Parameters
+    ----------
+    walls : (w, 4) float
+        Both ends of each wall, m. Walls that cross should be split at the crossing; otherwise it is no corner.
+    circles : (k, 3) float, optional
+        Centre and radius of each round object, m.
+
+    Raises
+    ------
+    ValueError
+        An array has another shape, there is no row at all, a value is not finite, a radius is not positive, or a wall
+        is shorter than `JOIN_M`.
     """
     walls = np.array(walls, dtype=np.float64)
     circles = np.empty((0, 3)) if circles is None else np.array(circles, dtype=np.float64)
@@ -75,7 +83,10 @@ def make_room(walls: Floats, circles: Floats | None = None) -> Room:
 def room_of(world: WorldConfig) -> Room:
     """Return the surfaces of a world as a known room; a side shorter than `JOIN_M` is left out.
 
-    Raises `ValueError`: it has no surface.
+    Raises
+    ------
+    ValueError
+        It has no surface.
     """
     sides = [side for side in world.sides_m() if math.dist(side[:2], side[2:]) >= JOIN_M]
     circles = [(drum.x_m, drum.y_m, drum.radius_m) for drum in world.drum]

@@ -78,7 +78,10 @@ class FoundLag(NamedTuple):
 class EchoLag:
     """Enters firings at the poses from which they were heard.
 
-    `ring`: the sensors, and the lag with which to begin.
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors, and the lag with which to begin.
 
     Attributes
     ----------

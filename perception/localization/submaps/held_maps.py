@@ -60,8 +60,12 @@ class HeldMaps:
     def move_to(self, poses: Floats, way: Floats) -> MapMoves | None:
         """Bring the maps to their poses as known now; return the motions, None where none is worth it.
 
-        `poses`, shape (n, 3): of the maps in the map frame, x, y (m) and direction (rad), not wrapped. `way`, shape
-        (n,): until each of them, m.
+        Parameters
+        ----------
+        poses : (n, 3) float
+            Of the maps in the map frame, x, y (m) and direction (rad), not wrapped.
+        way : (n,) float
+            Until each of them, m.
         """
         held, weights = self.archived_rows, np.exp((way - way[-1]) / NEAR_WAY_M)
         weights /= weights.sum()

@@ -157,8 +157,14 @@ def _add(system: Floats, x: float, y: float, theta: float, information: float, e
 def with_lines(before: Floats, lines: Floats, pose: Floats, information: Floats) -> tuple[Floats, Floats]:
     """Return the pose, and the inverse of its covariance, that lines and a match of cells give together.
 
-    `before`, `lines`: as of `pull`. `pose`, shape (3,): of the match, m and rad. `information`, shape (3, 3): of the
-    match.
+    Parameters
+    ----------
+    before, lines
+        As of `pull`.
+    pose : (3,) float
+        Of the match, m and rad.
+    information : (3, 3) float
+        Of the match.
     """
     here, system = pose, np.column_stack([information, np.zeros(3)])
     pairs, difference = np.empty((len(lines), 2)), np.empty(7)

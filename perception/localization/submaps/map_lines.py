@@ -60,8 +60,14 @@ NO_LINE, FOUND, DONE = range(3)
 def vote(readings: Floats, begin: int, end: int, half: float, taken: Floats, votes: Floats) -> None:
     """Count the echoes that each line may explain.
 
-    `readings`, `begin`, `end`, `half`: as of `local_grid.enter_passes`. `taken`, shape (n,): not zero for readings
-    that are explained already. `votes`, shape (NORMALS, DISTANCES): updated.
+    Parameters
+    ----------
+    readings, begin, end, half
+        As of `local_grid.enter_passes`.
+    taken : (n,) float
+        Not zero for readings that are explained already.
+    votes : (NORMALS, DISTANCES) float
+        Updated.
     """
     wide = int(GRAZING_RAD / NORMAL_STEP_RAD) + 1
     for k in range(begin, end):

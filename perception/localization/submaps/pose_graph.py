@@ -117,8 +117,14 @@ def linearise(
 def multiply(links: Records[Link], count: int, jacobians: Floats, given: Floats, result: Floats) -> None:
     """Multiply the normal matrix of all links with a vector.
 
-    `links`, `count`, `jacobians`: as of `linearise`. `given`, shape (SCALES + 3 n,): scales, then x, y, direction of
-    each node. `result`, shape (SCALES + 3 n,): overwritten. The first node is held: its rows are 0.
+    Parameters
+    ----------
+    links, count, jacobians
+        As of `linearise`.
+    given : (SCALES + 3 n,) float
+        Scales, then x, y, direction of each node.
+    result : (SCALES + 3 n,) float
+        Overwritten. The first node is held: its rows are 0.
     """
     result[:] = 0.0
     for k in range(SCALES):
@@ -191,9 +197,17 @@ def begin_step(
 def go_on(links: Records[Link], count: int, jacobians: Floats, vectors: Floats, iterations: int) -> float:
     """Do some iterations of conjugate gradients.
 
-    `links`, `count`, `jacobians`, `vectors`: as of `begin_step`; the vectors are updated. `iterations`: how many at
-    most.
-    Returned: the norm of what is left, by the inverse of the diagonal.
+    Parameters
+    ----------
+    links, count, jacobians, vectors
+        As of `begin_step`; the vectors are updated.
+    iterations : int
+        How many at most.
+
+    Returns
+    -------
+    float
+        The norm of what is left, by the inverse of the diagonal.
     """
     step, left, direction, product, diagonal, scaled = (
         vectors[0],
@@ -229,8 +243,12 @@ def go_on(links: Records[Link], count: int, jacobians: Floats, vectors: Floats, 
 def spread_from(links: Records[Link], count: int, nodes: Records[Node], spread: Floats) -> None:
     """Compute how uncertain each map lies to one of them, along the best way of links: at most so much.
 
-    `links`, `count`, `nodes`: as of `linearise`. `spread`, shape (n, 2): variance of place (m²) and direction (rad²):
-    0 for that one, infinite for all others. Overwritten.
+    Parameters
+    ----------
+    links, count, nodes
+        As of `linearise`.
+    spread : (n, 2) float
+        Variance of place (m²) and direction (rad²): 0 for that one, infinite for all others. Overwritten.
     """
     for _ in range(len(spread)):
         has_changed = False

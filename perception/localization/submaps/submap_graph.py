@@ -73,7 +73,10 @@ GRIDS_MAX: Final = 250
 class SubmapGraph:
     """The pose by maps of a few metres of way.
 
-    `ring`: the sensors.
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
 
     Attributes
     ----------
@@ -354,8 +357,12 @@ def _is_apart(moved: Floats) -> bool:
 def walk(moved: Floats, way: float, turn: float) -> Floats:
     """Return the covariance of a motion by odometry beside its scales, shape (3, 3).
 
-    `moved`, shape (3,): x, y (m) and direction (rad) of its end in the frame of its begin. `way`, `turn`: length (m)
-    and turns (rad) of it. The heading walks evenly along it.
+    Parameters
+    ----------
+    moved : (3,) float
+        x, y (m) and direction (rad) of its end in the frame of its begin.
+    way, turn : float
+        Length (m) and turns (rad) of it. The heading walks evenly along it.
     """
     place = WALK_M**2 * way + LEAST_VARIANCE
     heading = WALK_RAD**2 * (way + TURN_WAY * turn) + LEAST_VARIANCE

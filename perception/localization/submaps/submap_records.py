@@ -46,7 +46,10 @@ class Submap(Record):
 class Rows:
     """Records whose number grows with the way.
 
-    `record`: their kind.
+    Parameters
+    ----------
+    record : type of Record
+        Their kind.
     """
 
     SCRATCH: Final = ("_store",)

@@ -45,7 +45,12 @@ Flags = NDArray[np.bool_]
 def evidence_now(kept: Cells, place: int) -> int:
     """Return the evidence of a cell in one direction, faded by the way since it was last renewed.
 
-    `kept`, shape (4,): as kept. `place`: where the robot is now.
+    Parameters
+    ----------
+    kept : (4,) int16
+        As kept.
+    place : int
+        Where the robot is now.
     """
     value = min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[HIT]) + int(kept[PASSAGE])))
     faded = ((place - int(kept[STAMP])) & (PLACE_NUMBERS - 1)) // FADING_PLACES
@@ -98,7 +103,12 @@ def is_sure_elsewhere(planes: Cells, maybe_sure: Flags, iy: int, ix: int, own: i
 def fill_sure(planes: Cells, maybe_sure: Flags, place: int, out: Flags) -> None:
     """Write which cells are `SURE` in some looking direction.
 
-    `planes`, `maybe_sure`, `place`: as of `is_sure_elsewhere`; nothing is updated. `out`, shape (n, n): out.
+    Parameters
+    ----------
+    planes, maybe_sure, place
+        As of `is_sure_elsewhere`; nothing is updated.
+    out : (n, n) bool
+        Out.
     """
     for iy in range(maybe_sure.shape[0]):
         for ix in range(maybe_sure.shape[1]):

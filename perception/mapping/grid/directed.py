@@ -278,7 +278,12 @@ def enter_readings(
 class DirectedGrid:
     """The grid's memory.
 
-    `window`: where its cells are. `ring`: the sensors.
+    Parameters
+    ----------
+    window : Window
+        Where its cells are.
+    ring : Ring
+        The sensors.
     """
 
     SCRATCH: Final = (

@@ -60,8 +60,15 @@ def enter_reading(
         w = exp(−½ (θ/σ_θ)²);  m = w · exp(−½ ((d − r)/σ_r)²) / Σ
         p = ½ − EMPTY_PEAK · w                  for d < r − ARC_SIGMAS · σ_r
         p = ½ + PEAK · min(1, ELFES_UNIT · m)    on the arc
-    `log_odds`, shape (n, n): the torus. Updated. `raster`, `sensor`, `half_angle`, `r`, `edges`: as of
-    `moravec_elfes.enter_reading`. `sigma`: σ_r, m; 0 for a beam without an echo that is empty up to `r`.
+
+    Parameters
+    ----------
+    log_odds : (n, n) float
+        The torus. Updated.
+    raster, sensor, half_angle, r, edges
+        As of `moravec_elfes.enter_reading`.
+    sigma : float
+        σ_r, m; 0 for a beam without an echo that is empty up to `r`.
     """
     mask = log_odds.shape[0] - 1
     _, cell_m = raster
@@ -99,7 +106,12 @@ def enter_reading(
 class ElfesGrid:
     """The grid's memory.
 
-    `window`: where its cells are. `ring`: the sensors.
+    Parameters
+    ----------
+    window : Window
+        Where its cells are.
+    ring : Ring
+        The sensors.
     """
 
     mirrors: Final = 1.0

@@ -92,7 +92,12 @@ def make_grid_method(config: GridConfig, window: Window, ring: Ring) -> GridMeth
 class EvidenceGrid:
     """The grid around the robot, in the odometry's frame.
 
-    `ring`: the sensors. `config`: method, cells and window; the method is not `off`.
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    config : GridConfig
+        Method, cells and window; the method is not `off`.
     """
 
     SCRATCH: Final = ("ring",)
@@ -156,9 +161,17 @@ class EvidenceGrid:
     ) -> NDArray[np.bool_]:
         """Return which cells lines of sight of some firings cross before what is known to stand there.
 
-        `holding`, shape (n, n): the cells that hold something, row by row from the smallest y. `firings`: the
-        firings, each with its `bearings` and its `place`.
-        Returned, shape (n, n): as `holding`.
+        Parameters
+        ----------
+        holding : (n, n) bool
+            The cells that hold something, row by row from the smallest y.
+        firings : iterable of (Firing, (n,) float, int)
+            The firings, each with its `bearings` and its `place`.
+
+        Returns
+        -------
+        (n, n) bool
+            As `holding`.
         """
         lines, holds = SightLines(self.window, self.ring), self.window.rolled(holding)
         for firing, bearings, place in firings:
@@ -190,8 +203,11 @@ class EvidenceGrid:
     def occupancy(self, seen_from: tuple[float, float] | None = None) -> OccupancyWindow:
         """Return the window.
 
-        `seen_from`: a place x, y, m: then each cell's probability is that of an answer towards it. By default it is
-        that of an answer in any direction, and ½ where it would be less in a cell that no line of sight has crossed.
+        Parameters
+        ----------
+        seen_from : (float, float), optional
+            A place x, y, m: then each cell's probability is that of an answer towards it. By default it is that of an
+            answer in any direction, and ½ where it would be less in a cell that no line of sight has crossed.
         """
         cell_m = self.window.cell_m
         x, y = (cell_m * float(number) for number in self.window.corner)

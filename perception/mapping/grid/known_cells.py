@@ -33,8 +33,13 @@ class KnownCells:
 def known_cells(window: OccupancyWindow, side_max: int | None = None) -> KnownCells:
     """Return what a window knows.
 
-    `window`: as of `EvidenceGrid.occupancy`. `side_max`: greatest number of rows and of columns; where there are
-    more, one cell stands for a square of them, with the greatest of their probabilities.
+    Parameters
+    ----------
+    window : OccupancyWindow
+        As of `EvidenceGrid.occupancy`.
+    side_max : int, optional
+        Greatest number of rows and of columns; where there are more, one cell stands for a square of them, with the
+        greatest of their probabilities.
     """
     known = window.occupied != EVEN
     rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))

@@ -100,7 +100,12 @@ def enter_reading(
 class MoravecElfesGrid:
     """The grid's memory.
 
-    `window`: where its cells are. `ring`: the sensors.
+    Parameters
+    ----------
+    window : Window
+        Where its cells are.
+    ring : Ring
+        The sensors.
     """
 
     mirrors: Final = 1.0

@@ -266,7 +266,12 @@ def fill_crossed(sights: NDArray[np.int16], corner: Ints, places: int, units: fl
 class SightLines:
     """The cells that lines of sight have crossed.
 
-    `window`: where the cells are. `ring`: the sensors.
+    Parameters
+    ----------
+    window : Window
+        Where the cells are.
+    ring : Ring
+        The sensors.
     """
 
     SCRATCH: Final = ("_window", "_ring", "_blocked_m", "_shares", "_edges")
@@ -324,8 +329,12 @@ class SightLines:
     def crossed(self, mirrors: float, trust: float | None = None) -> Flags:
         """Return which cells a line of sight has crossed: (n, n), row by row from the smallest y.
 
-        `mirrors`: how far this is a place of mirrors, 0 to 1, as is known by now. `trust`: in place of what is learnt
-        from these lines.
+        Parameters
+        ----------
+        mirrors : float
+            How far this is a place of mirrors, 0 to 1, as is known by now.
+        trust : float, optional
+            In place of what is learnt from these lines.
         """
         trust = self.trust if trust is None else trust
         least = PLACES_MIN if mirrors < MIRRORS_MIN else COUNT_MAX + 1

@@ -85,8 +85,14 @@ def octant(dx: float, dy: float) -> int:
 def row_of_beam(dy: float, reach: float, edges: Floats) -> tuple[float, float]:
     """Return between which x from the sensor a row of cells lies in a beam, m; the first is greater if nowhere.
 
-    `dy`: the row's y from the sensor, m. `reach`: length of the beam, m. `edges`, shape (4,): the directions of its
-    right and its left edge, unit vectors x, y, x, y; less than 180° apart.
+    Parameters
+    ----------
+    dy : float
+        The row's y from the sensor, m.
+    reach : float
+        Length of the beam, m.
+    edges : (4,) float
+        The directions of its right and its left edge, unit vectors x, y, x, y; less than 180° apart.
     """
     square = reach * reach - dy * dy
     if square <= 0.0:
@@ -112,7 +118,14 @@ def row_of_beam(dy: float, reach: float, edges: Floats) -> tuple[float, float]:
 def rows_within(raster: Raster, sy: float, reach: float, mask: int) -> tuple[int, int]:
     """Return the first and the last row of a window's cells that come as near to a y as `reach`, m.
 
-    `raster`: of the window. `sy`, `reach`: m. `mask`: rows of the window, less one.
+    Parameters
+    ----------
+    raster : Raster
+        Of the window.
+    sy, reach : float
+        m.
+    mask : int
+        Rows of the window, less one.
     """
     corner, cell_m = raster
     first = max(int(corner[1]), math.floor((sy - reach) / cell_m))
@@ -123,7 +136,14 @@ def rows_within(raster: Raster, sy: float, reach: float, mask: int) -> tuple[int
 def columns_of_beam(raster: Raster, sx: float, dy: float, reach: float, edges: Floats, mask: int) -> tuple[int, int]:
     """Return the first and the last column of a row whose middles lie in a beam; the first is greater if none does.
 
-    `raster`, `mask`: as for `rows_within`. `sx`: the sensor's x, m. `dy`, `reach`, `edges`: as for `row_of_beam`.
+    Parameters
+    ----------
+    raster, mask
+        As for `rows_within`.
+    sx : float
+        The sensor's x, m.
+    dy, reach, edges
+        As for `row_of_beam`.
     """
     corner, cell_m = raster
     low, high = row_of_beam(dy, reach, edges)
@@ -171,7 +191,12 @@ def _corner_bound(window: Window) -> Bound:
 class Window:
     """The place of the window.
 
-    `cells`: cells along each side, a power of two. `cell_m`: side of a cell, m.
+    Parameters
+    ----------
+    cells : int
+        Cells along each side, a power of two.
+    cell_m : float
+        Side of a cell, m.
     """
 
     SCRATCH: Final = ("_shared",)
@@ -203,8 +228,12 @@ class Window:
     def follow(self, pose: Pose, planes: tuple[NDArray[np.generic], ...]) -> bool:
         """Move the window after the robot and clear what comes in; return whether the pose is a possible one.
 
-        `pose`: the robot's. `planes`: the cells' memory, each of shape (cells, cells, …): y, then x. Updated; those
-        that share the window, too.
+        Parameters
+        ----------
+        pose : Pose
+            The robot's.
+        planes : tuple of array
+            The cells' memory, each of shape (cells, cells, …): y, then x. Updated; those that share the window, too.
         """
         if not is_possible(pose):
             return False

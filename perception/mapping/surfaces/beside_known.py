@@ -63,8 +63,14 @@ def nearness(
 ) -> NDArray[np.int64]:  # fmt: skip
     """Return how near places along surfaces are to what is known, from `UNSURE` to `ON_MODEL`, shape (n, PLACES).
 
-    `rows`, shape (n,): the surfaces. `known`: what the method reports: walls, and objects. `reach_m`: radius within
-    which each model's outline lies, m.
+    Parameters
+    ----------
+    rows : (n,) record of Surface
+        The surfaces.
+    known : tuple of DetectedObject
+        What the method reports: walls, and objects.
+    reach_m : mapping
+        Radius within which each model's outline lies, m.
     """
     walls = np.array([one.ends for one in known if one.ends is not None]).reshape(-1, 4)
     bodies, body_reaches = _bodies(known, reach_m)
@@ -95,8 +101,14 @@ def _bodies(known: tuple[DetectedObject, ...], reach_m: Mapping[str, float]) -> 
 def beside_known(rows: Structured, near: NDArray[np.int64], prior: float) -> SurfaceReport:
     """Return the walls and the polylines that are reported beside what is known, or in place of its walls.
 
-    `rows`, shape (n,): the surfaces. `near`, shape (n, PLACES): how near places along them are to what is known.
-    `prior`: from `wall_prior`, nat.
+    Parameters
+    ----------
+    rows : (n,) record of Surface
+        The surfaces.
+    near : (n, PLACES) int
+        How near places along them are to what is known.
+    prior : float
+        From `wall_prior`, nat.
     """
     if not len(rows):
         return SurfaceReport()
@@ -130,7 +142,12 @@ def lengths(rows: Structured) -> Floats:
 def wall_prior(rows: Structured, near: NDArray[np.int64]) -> float:
     """Return the log odds that a piece of this place is a wall, before its own evidence, nat.
 
-    `rows`, shape (n,): the surfaces. `near`, shape (n, PLACES): as for `beside_known`.
+    Parameters
+    ----------
+    rows : (n,) record of Surface
+        The surfaces.
+    near : (n, PLACES) int
+        As for `beside_known`.
     """
     length = lengths(rows)
     length[length < PIECE_MIN_M] = 0.0  # shorter ones are left of the ends of others
@@ -151,7 +168,13 @@ def refuted(
     In such a place most of what seems round is not: so much has to speak for it as for a place of walls, the evidence
     of the pieces at its outline, circle against line, included. Drives: 4 to 12 nat of seven false ones; generated
     rooms: 15 and more of the true ones.
-    `rows`, `known`: as for `nearness`. `radius_m`: radii of the round models, m.
+
+    Parameters
+    ----------
+    rows, known
+        As for `nearness`.
+    radius_m : mapping
+        Radii of the round models, m.
     """
     pieces = rows[lengths(rows) >= PIECE_MIN_M]  # a shorter one lies at a round outline as well
     places = places_on(pieces, PLACES).reshape(-1, PLACES, 2)

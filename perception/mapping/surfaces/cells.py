@@ -66,7 +66,12 @@ def cell_of(offset: float) -> int:
 def answer_probability(cells: CellCounts, i: int, j: int, b: int) -> float:
     """Return the probability that a cell answers to a direction.
 
-    `i`, `j`, `b`: row and column, not in the rim, and the direction.
+    Parameters
+    ----------
+    cells : CellCounts
+        The cells.
+    i, j, b : int
+        Row and column, not in the rim, and the direction.
     """
     hits, every = cells.hits, cells.all_hits
     beside = hits[b, i - 1, j] + hits[b, i + 1, j] + hits[b, i, j - 1] + hits[b, i, j + 1]
@@ -85,8 +90,14 @@ def answer_probability(cells: CellCounts, i: int, j: int, b: int) -> float:
 def enter_passes(cells: CellCounts, q: KeptReading, half: float, sign: int) -> None:
     """Add what a range passed through, or take it away.
 
-    `cells`, `q`: the cells, updated, and the reading. `half`: half of the beam's opening, rad, at most π/4. `sign`: 1
-    or −1.
+    Parameters
+    ----------
+    cells, q
+        The cells, updated, and the reading.
+    half : float
+        Half of the beam's opening, rad, at most π/4.
+    sign : int
+        1 or −1.
     """
     x, y, axis = q.x, q.y, q.axis
     size, a_m = 2.0 * CELL_M, 0.5 * CELLS_A_M
@@ -165,7 +176,12 @@ def off_axis(k: int) -> float:
 def lay_arc(cells: CellCounts, q: KeptReading, half: float) -> None:
     """Write the places on a reading's arc into `cells.arc`: offsets from the map's centre, cells and directions.
 
-    `cells`, `q`: the cells, whose `arc` is overwritten, and the reading, an echo. `half`: as for `enter_passes`.
+    Parameters
+    ----------
+    cells, q
+        The cells, whose `arc` is overwritten, and the reading, an echo.
+    half : float
+        As for `enter_passes`.
     """
     step = 2.0 * half / SAMPLES
     first = q.axis + off_axis(0) * half
@@ -189,8 +205,11 @@ def lay_arc(cells: CellCounts, q: KeptReading, half: float) -> None:
 def share_echo(cells: CellCounts, q: KeptReading) -> None:
     """Share an echo among the places on its arc, which was laid, each as the map says that it answers.
 
-    `cells`, `q`: the cells without this echo, and the reading; its shares are overwritten. They sum up to less than a
-    whole echo, as that may come from nowhere.
+    Parameters
+    ----------
+    cells, q
+        The cells without this echo, and the reading; its shares are overwritten. They sum up to less than a whole
+        echo, as that may come from nowhere.
     """
     total = OUTLIER
     p = 0.0
@@ -349,7 +368,13 @@ def strength_of(cells: CellCounts, i: int, j: int) -> float:
 def passes_of_heard(cells: CellCounts, b: int, i: int, j: int, hits: int) -> int:
     """Return how many ranges passed a cell in a direction that hears it, in parts of `WHOLE`.
 
-    `b`, `i`, `j`: the direction, row and column. `hits`: what that direction hears there, in parts of `WHOLE`: passes
-    count less where it is less than an echo.
+    Parameters
+    ----------
+    cells : CellCounts
+        The cells.
+    b, i, j : int
+        The direction, row and column.
+    hits : int
+        What that direction hears there, in parts of `WHOLE`: passes count less where it is less than an echo.
     """
     return int(cells.passes[b, i >> 1, j >> 1] * min(hits, WHOLE) // WHOLE_PASS)

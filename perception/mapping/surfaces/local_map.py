@@ -37,8 +37,14 @@ from perception.records import Structured, records, zeros
 class LocalMapSearch:
     """A local map and the search in it.
 
-    `half`: half of the beam's opening, rad. `range_max`: ranges from this on are silence, m. `radii`, shape (k,):
-    radii of the models, m.
+    Parameters
+    ----------
+    half : float
+        Half of the beam's opening, rad.
+    range_max : float
+        Ranges from this on are silence, m.
+    radii : (k,) float
+        Radii of the models, m.
     """
 
     SCRATCH: Final = ("room", "_counts", "_c", "_half", "_range_max", "radii")

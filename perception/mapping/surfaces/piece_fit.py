@@ -170,8 +170,14 @@ def fit_circle(room: LocalMap, counts: CellCounts, number: int, radius: float) -
 def judge(room: LocalMap, counts: CellCounts, number: int, radii: Floats) -> None:
     """Fit a piece and write its evidence: how much better its line fits than any of some circles.
 
-    `room`, `counts`: the map, updated, and its counts, with its echoes grouped. `number`: the piece's. `radii`, shape
-    (k,): radii of the circles, m.
+    Parameters
+    ----------
+    room, counts
+        The map, updated, and its counts, with its echoes grouped.
+    number : int
+        The piece's.
+    radii : (k,) float
+        Radii of the circles, m.
     """
     piece = room.pieces[number]
     line = fit_line(room, counts, number)

@@ -77,8 +77,13 @@ def capture(room: LocalMap, counts: CellCounts, begin: int, most: int) -> int:
 
     Cells that find no room are left out; weak ones leave the last quarter of it to the others. The places of cells in
     `counts.index` are written; it was 0 everywhere.
-    `room`, `counts`: the map, updated, and its counts. `begin`, `most`: the first of the `ROW_PARTS`, and after how
-    many cells whose strength was computed the last one follows.
+
+    Parameters
+    ----------
+    room, counts
+        The map, updated, and its counts.
+    begin, most : int
+        The first of the `ROW_PARTS`, and after how many cells whose strength was computed the last one follows.
     """
     at, computed = begin, 0
     while at < ROW_PARTS and computed < most:
@@ -155,8 +160,15 @@ def walk(
 
     `counts.sums` is overwritten: weight, its sums of x, y, xx, xy, yy about the line's point, cells, cells without an
     owner, the ends, the share of the steps that met a cell, and 1 if the reach has ended it.
-    `cells`, `counts`: the occupied cells; their index, and the marks of walks, which are updated. `begin`, `reach`:
-    where on the line to begin, and how far from there to go, m.
+
+    Parameters
+    ----------
+    cells, counts
+        The occupied cells; their index, and the marks of walks, which are updated.
+    line : Piece
+        The line.
+    begin, reach : float
+        Where on the line to begin, and how far from there to go, m.
     """
     sums = counts.sums
     sums[:] = 0.0
@@ -332,8 +344,12 @@ def count_answers(room: LocalMap, counts: CellCounts, i: int, j: int) -> None:
 def grow_all(room: LocalMap, counts: CellCounts, most: int) -> bool:
     """Grow pieces from the strongest free cells; return whether all were tried.
 
-    `room`, `counts`: the map, updated: `room.at` is the next cell in order. `most`: steps along lines, after which no
-    other cell is tried; to find a cell's direction counts as `DIRECTION_STEPS`.
+    Parameters
+    ----------
+    room, counts
+        The map, updated: `room.at` is the next cell in order.
+    most : int
+        Steps along lines, after which no other cell is tried; to find a cell's direction counts as `DIRECTION_STEPS`.
     """
     counts.steps = 0
     while room.at < room.cell_count and room.piece_count < len(room.pieces):

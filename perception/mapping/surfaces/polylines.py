@@ -31,7 +31,12 @@ LINKED: Final = round(LINK_M / CELL_M)
 def choose_nodes(room: LocalMap, counts: CellCounts, begin: int, end: int) -> None:
     """Make the strongest cells that are left, at least `NODE_M` apart, points of polylines, where echoes agree.
 
-    `room`, `counts`: the map, updated, and its counts. `begin`, `end`: which cells, in order of their strength.
+    Parameters
+    ----------
+    room, counts
+        The map, updated, and its counts.
+    begin, end : int
+        Which cells, in order of their strength.
     """
     nat = pass_nat(room)
     for at in range(begin, end):
@@ -79,7 +84,13 @@ def is_agreed(counts: CellCounts, cell: SurfaceCell, nat: float) -> bool:
     """Return whether two directions' echoes agree on a cell and those around it: strays come one by one.
 
     Ranges that passed it in these directions must not say more than the echoes do.
-    `counts`, `cell`: the map's counts, and the cell. `nat`: from `pass_nat`.
+
+    Parameters
+    ----------
+    counts, cell
+        The map's counts, and the cell.
+    nat : float
+        From `pass_nat`.
     """
     strength, passes = 0.0, 0.0
     for b in range(DIRECTIONS):

@@ -129,8 +129,14 @@ def has_left(rooms: Records[LocalMap], x: float, y: float) -> bool:
 def do_quantum(rooms: Records[LocalMap], every: Records[CellCounts], half: float, radii: Floats) -> bool:
     """Do one quantum; return whether it ended a search.
 
-    `rooms`, `every`, shape (1,): the map and its counts, updated. `half`: half of the beam's opening, rad. `radii`,
-    shape (k,): radii of the models, m.
+    Parameters
+    ----------
+    rooms, every : (1,) record
+        The map and its counts, updated.
+    half : float
+        Half of the beam's opening, rad.
+    radii : (k,) float
+        Radii of the models, m.
     """
     room, counts = rooms[0], every[0]
     at = room.at

@@ -36,8 +36,14 @@ HALF_ANGLE_MAX: Final = math.radians(45.0)
 class SurfaceMap(NoSurfaces):
     """Walls and polylines from all echoes, in the frame in which firings are given.
 
-    `ring`: the sensors. `models`: the objects to recognise: what one of the round ones explains better is no wall.
-    `config`: the settings.
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    models : sequence of ModelConfig
+        The objects to recognise: what one of the round ones explains better is no wall.
+    config : SurfacesConfig
+        The settings.
     """
 
     SCRATCH: Final = ("_known", "_near", "_report", "_archived")
@@ -156,7 +162,10 @@ class SurfaceMap(NoSurfaces):
     def report(self, known: Callable[[], tuple[DetectedObject, ...]]) -> SurfaceReport:
         """Return walls and polylines beside what the method reports; the same tuples until they change.
 
-        `known`: returns what the method reports.
+        Parameters
+        ----------
+        known : callable
+            Returns what the method reports.
         """
         objects = known()
         if self._report is None or objects != self._known:
@@ -180,7 +189,13 @@ class SurfaceMap(NoSurfaces):
         """Return the archived objects without those that surfaces replace or refute.
 
         They may be many, and this is asked often: another tuple than before is filtered, the same one is not.
-        `archived`: what the method left behind; the same tuple until that changes. `known`: as for `report`.
+
+        Parameters
+        ----------
+        archived : tuple of DetectedObject
+            What the method left behind; the same tuple until that changes.
+        known : callable
+            As for `report`.
         """
         report = self.report(known)
         if self._archived is None or archived is not self._archived[0]:

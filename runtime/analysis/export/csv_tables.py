@@ -158,7 +158,10 @@ def _known(values: list[float]) -> list[float | None]:
 def write_csv(timeline: Timeline, folder: Path) -> list[Path]:
     """Write a CSV file for each table and return the files; unknown values are empty cells.
 
-    Raises `OSError`: a file cannot be written.
+    Raises
+    ------
+    OSError
+        A file cannot be written.
     """
     paths = []
     for name, table in tables(timeline).items():
@@ -174,7 +177,10 @@ def write_csv(timeline: Timeline, folder: Path) -> list[Path]:
 def write_parquet(timeline: Timeline, folder: Path) -> list[Path]:
     """Write a Parquet file for each table and return the files; their metadata holds units and frame.
 
-    Raises `OSError`: a file cannot be written.
+    Raises
+    ------
+    OSError
+        A file cannot be written.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq

@@ -41,7 +41,10 @@ T = TypeVar("T")
 def write_foxglove(timeline: Timeline, path: Path) -> list[Path]:
     """Write a run as an MCAP file for Foxglove and return the file.
 
-    Raises `OSError`: the file cannot be written.
+    Raises
+    ------
+    OSError
+        The file cannot be written.
     """
     context = foxglove.Context()
     with path.open("wb") as file:

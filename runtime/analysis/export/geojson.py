@@ -50,7 +50,11 @@ def places_of_geojson(text: str, name: str) -> PlacesConfig:
     """Return the places of a feature collection, as `world_geojson` writes them; other features are passed over.
 
     A point with a name is a place. A line or an area of the kinds `no_go_line`, `no_go_area` and `speed_area` is one.
-    Raises `ConfigError`: the text is no feature collection in metres, or a feature of these kinds is invalid.
+
+    Raises
+    ------
+    ConfigError
+        The text is no feature collection in metres, or a feature of these kinds is invalid.
     """
     table: dict[str, list[dict[str, Any]]] = {key: [] for key in PLACE_KEYS}
     try:

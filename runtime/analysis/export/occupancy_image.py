@@ -60,7 +60,10 @@ class OccupancyImage:
     def write(self, path: Path) -> Path:
         """Write the image (PGM) and beside it the YAML; return the path of the YAML.
 
-        Raises `OSError`: one of them cannot be written.
+        Raises
+        ------
+        OSError
+            One of them cannot be written.
         """
         rows, columns = self.pixels.shape
         path.write_bytes(b"P5\n%d %d\n255\n" % (columns, rows) + self.pixels.tobytes())
@@ -146,7 +149,11 @@ def run_evidence(
     """Return the evidence grid of all readings of a run; ½ where it is free and no line of sight has crossed.
 
     Arguments are as of `occupancy_image`; low and high corner span the rectangle that it has to hold, m.
-    Raises `ValueError`: it is too large.
+
+    Raises
+    ------
+    ValueError
+        It is too large.
     """
     from perception.mapping.grid.evidence_grid import EvidenceGrid
 

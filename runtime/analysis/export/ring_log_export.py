@@ -34,7 +34,11 @@ def recorded_firings(recording: Recording) -> list[Firing]:
 
     When a robot restarts, its clock and its odometry restart, which a list cannot represent. Then only the firings
     after the last restart are returned.
-    Raises `RecordingError`: the recording holds no firing.
+
+    Raises
+    ------
+    RecordingError
+        The recording holds no firing.
     """
     firings: list[Firing] = []
     for record in recording.cycle_records():

@@ -73,7 +73,10 @@ TF: Final = "tf2_msgs/TFMessage"
 def write_bag(timeline: Timeline, folder: Path) -> list[Path]:
     """Write a run as a ROS 2 bag and return its folder, which must not exist yet; its storage is MCAP.
 
-    Raises `OSError`: it cannot be written.
+    Raises
+    ------
+    OSError
+        It cannot be written.
     """
     with Writer(folder, version=VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
         _BagExporter(timeline, writer).write()

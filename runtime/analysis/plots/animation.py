@@ -120,7 +120,11 @@ def save_moving(
     """Write the animation as a GIF and, if ffmpeg is installed, as an MP4, and return the files.
 
     Axes are in `units`; `name` has no suffix; `on_frame` is called after each frame, for a progress bar.
-    Raises `OSError`: a file cannot be written.
+
+    Raises
+    ------
+    OSError
+        A file cannot be written.
     """
     shown = []
     for frame in frames(timeline, units):

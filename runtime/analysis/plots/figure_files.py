@@ -37,7 +37,11 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Write a figure in every format and return the files.
 
     The name has no suffix.
-    Raises `OSError`: a file cannot be written.
+
+    Raises
+    ------
+    OSError
+        A file cannot be written.
     """
     paths = [folder / f"{name}.{kind}" for kind in FORMATS]
     for path, kind in zip(paths, FORMATS, strict=True):

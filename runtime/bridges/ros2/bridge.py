@@ -139,7 +139,10 @@ class _Bridge:
     def _connected(self) -> Operator:
         """Return the operator of the connection.
 
-        Raises `ConsoleError`: there is none.
+        Raises
+        ------
+        ConsoleError
+            There is none.
         """
         if self._operator is None:
             raise ConsoleError(NO_RUN)

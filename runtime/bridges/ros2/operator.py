@@ -116,7 +116,10 @@ class Operator:
     async def command(self, name: str) -> str:
         """Carry out `arm`, `disarm` or `halt`, and return what to answer.
 
-        Raises `ConsoleError`: the run refuses it.
+        Raises
+        ------
+        ConsoleError
+            The run refuses it.
         """
         if name != "halt":
             await self._take_control()
@@ -126,7 +129,10 @@ class Operator:
     async def goal(self, x: float, y: float, heading_rad: float | None, frame: str) -> None:
         """Drive to a place (m) and, unless None, turn to a heading there; `frame` is odom or map.
 
-        Raises `ConsoleError`: the run refuses it.
+        Raises
+        ------
+        ConsoleError
+            The run refuses it.
         """
         await self._take_control()
         degrees = None if heading_rad is None else math.degrees(heading_rad)
@@ -135,7 +141,10 @@ class Operator:
     async def place(self, x: float, y: float, theta: float) -> None:
         """Say where the robot is in the map.
 
-        Raises `ConsoleError`: the run refuses it.
+        Raises
+        ------
+        ConsoleError
+            The run refuses it.
         """
         await self._take_control()
         await self._client.request("place_robot", x=x, y=y, theta=theta)
@@ -143,7 +152,10 @@ class Operator:
     async def _take_control(self) -> None:
         """Get control, unless this client has it.
 
-        Raises `ConsoleError`: another client has it.
+        Raises
+        ------
+        ConsoleError
+            Another client has it.
         """
         self._has_asked = True
         if not self._client.has_control:

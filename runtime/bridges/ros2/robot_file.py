@@ -50,7 +50,11 @@ def robot_file(heard: Heard, *, radius_m: float, speed_m_s: float, turn_rad_s: f
     """Return the tables of the robot file.
 
     It was heard for some seconds. Radius and limits of the body are given, since no topic says them.
-    Raises `RobotFileError`: there are no ranges, no odometry, or no frames that lead from a sensor to the base.
+
+    Raises
+    ------
+    RobotFileError
+        There are no ranges, no odometry, or no frames that lead from a sensor to the base.
     """
     if not heard.ranges:
         raise RobotFileError("no sensor_msgs/Range was heard; start the robot's sensors, or check ROS_DOMAIN_ID")
@@ -100,7 +104,10 @@ def robot_file(heard: Heard, *, radius_m: float, speed_m_s: float, turn_rad_s: f
 def mount_of(name: str, base: str, frames: Mapping[str, Frame]) -> tuple[float, float, float]:
     """Return place (m) and direction (rad) of a frame in the base's, in the plane.
 
-    Raises `RobotFileError`: no frames lead from the one to the other.
+    Raises
+    ------
+    RobotFileError
+        No frames lead from the one to the other.
     """
     point, axis, at = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), name
     for _ in range(DEPTH_MAX):

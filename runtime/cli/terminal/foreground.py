@@ -8,7 +8,10 @@ import os
 def in_foreground(fd: int) -> bool:
     """Return whether the program has the terminal: one in the background is stopped if it reads or changes it.
 
-    `fd`: of the terminal; one that is gone belongs to no program, and may be read.
+    Parameters
+    ----------
+    fd : int
+        Of the terminal; one that is gone belongs to no program, and may be read.
     """
     try:
         return os.tcgetpgrp(fd) == os.getpgrp()

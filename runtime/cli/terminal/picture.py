@@ -100,7 +100,12 @@ class Snapshot:
 class Picture:
     """Draws snapshots for a terminal.
 
-    `console`: the terminal. `scale`: of the run.
+    Parameters
+    ----------
+    console : Console
+        The terminal.
+    scale : Scale
+        Of the run.
     """
 
     def __init__(self, console: Console, scale: Scale) -> None:

@@ -21,7 +21,12 @@ MARGIN_M: Final = 0.6
 class Plan:
     """A character raster over a rectangle of the plane that holds all given points.
 
-    `points`: points inside the rectangle, m. `columns`, `rows`: size in characters.
+    Parameters
+    ----------
+    points : iterable of (x, y)
+        Points inside the rectangle, m.
+    columns, rows : int
+        Size in characters.
     """
 
     def __init__(self, points: Iterable[tuple[float, float]], columns: int, rows: int) -> None:
@@ -42,8 +47,14 @@ class Plan:
     def mark(self, x: float, y: float, character: str, style: str) -> None:
         """Draw a character at a point, m; points outside are ignored.
 
-        `x`, `y`: the point, m. `character`: one character; it replaces an earlier one in the same cell. `style`:
-        style of the character, as rich names it.
+        Parameters
+        ----------
+        x, y : float
+            The point, m.
+        character : str
+            One character; it replaces an earlier one in the same cell.
+        style : str
+            Style of the character, as rich names it.
         """
         column = math.floor((x - self._left) / self._cell)
         row = math.floor((self._top - y) / (self._cell * CELL_ASPECT))
@@ -53,8 +64,14 @@ class Plan:
     def circle(self, x: float, y: float, radius: float, character: str, style: str) -> None:
         """Draw a circle of characters around a point, m.
 
-        `x`, `y`, `radius`: centre and radius, m. `character`: the character of which the circle consists. `style`:
-        style of the characters, as rich names it.
+        Parameters
+        ----------
+        x, y, radius : float
+            Centre and radius, m.
+        character : str
+            The character of which the circle consists.
+        style : str
+            Style of the characters, as rich names it.
         """
         steps = max(8, math.ceil(4.0 * math.pi * radius / self._cell))
         for k in range(steps):
@@ -64,7 +81,12 @@ class Plan:
     def line(self, x1: float, y1: float, x2: float, y2: float, character: str, style: str) -> None:
         """Draw a line of characters from (x1, y1) to (x2, y2), m.
 
-        `x1`, `y1`, `x2`, `y2`: the ends, m. `character`, `style`: as of `mark`.
+        Parameters
+        ----------
+        x1, y1, x2, y2 : float
+            The ends, m.
+        character, style : str
+            As of `mark`.
         """
         steps = min(LINE_STEPS_MAX, max(1, math.ceil(math.dist((x1, y1), (x2, y2)) / self._cell)))
         for k in range(steps + 1):

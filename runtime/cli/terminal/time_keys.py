@@ -36,7 +36,12 @@ def noting_what_waits(
 class TimeKeys:
     """Carries out one key at a time; the log says why a key had no effect.
 
-    `control`: of the run. `log`: receives why a key had no effect.
+    Parameters
+    ----------
+    control : TimeControl
+        Of the run.
+    log : structlog logger
+        Receives why a key had no effect.
     """
 
     def __init__(self, control: TimeControl, log: FilteringBoundLogger) -> None:

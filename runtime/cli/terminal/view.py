@@ -58,7 +58,14 @@ def after_each_cycle(call: OnCycle) -> OnCycle:
 class View:
     """Shows the run on a terminal.
 
-    `settings`: of the run. `console`: the terminal. `units`: units of the table of objects.
+    Parameters
+    ----------
+    settings : Settings
+        Of the run.
+    console : Console
+        The terminal.
+    units : {"m", "ft"}
+        Units of the table of objects.
     """
 
     def __init__(self, settings: Settings, console: Console, units: Units) -> None:
@@ -93,7 +100,14 @@ class View:
     def on_cycle(self, record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
         """Store what the view shows next.
 
-        `stats`: of the run. `driver`: for the counts of the link.
+        Parameters
+        ----------
+        record, state : CycleRecord, State
+            Of the cycle.
+        stats : CycleStats
+            Of the run.
+        driver : RobotDriver
+            For the counts of the link.
         """
         for firing in record.inputs.received.firings:
             fired = ~np.isnan(firing.ranges_m)
@@ -168,7 +182,10 @@ class View:
     def _pass_on(self) -> None:
         """Pass on what is new, the newest snapshot only; at the end, close the pipe, which ends the other process.
 
-        Raises `BrokenPipeError`: that process has ended before.
+        Raises
+        ------
+        BrokenPipeError
+            That process has ended before.
         """
         picture = self._picture
         if picture is None or picture.stdin is None or picture.stderr is None:
