@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -60,115 +59,6 @@ def towards(w: Array, centre: Array, rho: float, gate: float) -> Array:
     seen = naive_bayes.look(w, centre)
     total = seen.u[np.abs(w[:, 4] - (seen.d - rho)) < gate].sum(0)
     return np.asarray(total / np.hypot(*total)) if total.any() else np.zeros(2)
-
-
-@dataclass
-class Line:
-    """A wall: n·(q − origin) = c, covariance of (angle, c), extent, log odds, echoes."""
-
-    normal: Array
-    c: float
-    origin: Array
-    cov: Array
-    low: float
-    high: float
-    log: float
-    echoes: float
-
-    @property
-    def along(self) -> Array:
-        return np.array([-self.normal[1], self.normal[0]])
-
-    def off(self, place: Array) -> float:
-        """Return the distance of a place before the line."""
-        return self.c - float(self.normal @ (place - self.origin))
-
-    def foot(self, place: Array) -> float:
-        return float(self.along @ (place - self.origin))
-
-    def row(self) -> list[float]:
-        p = self.cov
-        return [
-            *self.normal,
-            self.c,
-            *self.origin,
-            p[0, 0],
-            p[0, 1],
-            p[1, 1],
-            self.low,
-            self.high,
-            self.log,
-            self.echoes,
-        ]
-
-    def follow(self, place: Array, e: float, var: float) -> None:
-        """Correct by one range whose prediction is c − n·q: the textbook's extended Kalman filter."""
-        self.cov = self.cov + np.diag([1e-8, 1e-6 * FT**2])
-        h = np.array([-float(self.along @ (place - self.origin)), 1.0])
-        gain = self.cov @ h / (h @ self.cov @ h + var)
-        self.cov = (np.eye(2) - np.outer(gain, h)) @ self.cov
-        turn = math.atan(gain[0] * e)  # the turn is to first order and the normal made a unit again
-        c, s = math.cos(turn), math.sin(turn)
-        self.normal = np.array([[c, -s], [s, c]]) @ self.normal
-        self.c += gain[1] * e
-
-
-def same_line(known: Line, new: Line) -> bool:
-    """Return whether a new line is a known one: parallel, near, and not far beyond the ends of that one."""
-    place = new.origin + new.c * new.normal
-    return (
-        float(known.normal @ new.normal) > 0.98
-        and abs(known.off(place)) < 0.4 * FT
-        and known.low - FT < known.foot(place) < known.high + FT
-    )
-
-
-def update_line(
-    line: Line, k: int, cur: Array, owner: list[int], sigma: tuple[float, float], half_box: float, half_angle: float,
-    cosines: tuple[float, float, float], gate: float, length_min: float,
-) -> Line | None:  # fmt: skip
-    """Return line k after the readings that it explains have corrected it; None if it ends."""
-    opt, half, inside = cosines
-    for i, q in enumerate(cur):
-        cos, d, r = float(line.normal @ q[2:4]), line.off(q[:2]), float(q[4])
-        if cos < 0.8 or d <= 0:
-            continue
-        foot, takes_over = line.foot(q[:2]), line.high - line.low > length_min
-        pure = sigma[0] ** 2 + 1e-6 * FT**2 + (sigma[1] * d) ** 2
-        tight = half_box + 0.02 * FT + 3 * math.sqrt(pure)
-        if cos >= opt:
-            if abs(r - d) < tight and line.low - 0.5 * FT < foot < line.high + 0.5 * FT:
-                if owner[i] == -1 and takes_over:
-                    owner[i] = -2 - k
-                line.low, line.high = min(line.low, foot), max(line.high, foot)
-                line.log, line.echoes = min(line.log + 0.5, 6.0), line.echoes + 1
-                line.follow(q[:2], r - d, pure + half_box**2 / 3)
-            elif r - d > gate and cos >= inside and line.low + 0.2 * FT < foot < line.high - 0.2 * FT:
-                line.log -= 1
-                if line.log < 0:
-                    return None
-        elif r < SILENT:
-            axis = math.atan2(q[3], q[2]) - math.atan2(line.normal[1], line.normal[0])
-            axis = (axis + math.pi) % (2 * math.pi) - math.pi
-            edge = math.copysign(abs(axis) - half_angle, axis)  # the beam's edge nearer to the normal
-            at = foot + d * math.tan(edge)
-            if abs(r - d / math.cos(edge)) < tight + 0.05 * FT and line.low - 0.7 * FT < at < line.high + 0.7 * FT:
-                if owner[i] == -1 and takes_over:
-                    owner[i] = -2 - k
-                if cos >= half - 0.1:
-                    line.low, line.high = min(line.low, at), max(line.high, at)
-    return line
-
-
-def stands_in_wall(lines: Iterable[Line], place: Array, rho: float) -> bool:
-    """Return whether a body's centre lies in a long wall with many echoes, or close to its face."""
-    return any(
-        line.echoes > 10
-        and line.high - line.low > 2 * FT
-        and -0.85 * rho < line.off(place) < 0.7 * rho
-        and line.low - 8 * FT < line.foot(place) < line.high + 8 * FT
-        for line in lines
-    )
 
 
 def roughness(
@@ -341,14 +231,14 @@ def next_in_turn(
 
 def probability(
     own: float, known: bool, prior: float, general: float, unknown: float, leads: dict[int, float], outline: float,
-    radius: float, models: int, line: int, in_wall: bool,
+    radius: float, models: int, line: int,
 ) -> float:  # fmt: skip
     """Return a track's share among all explanations, each weighted by its evidence and its prior."""
 
     def weight(nat: float) -> float:
         return math.exp(float(np.clip(nat, -60.0, 60.0)))
 
-    bonus = (prior if known else 0.0) + (-8.0 if known and in_wall else 0.0)
+    bonus = prior if known else 0.0
     total = 1.0 + weight(-own - bonus) + weight(unknown + general - own - bonus)
     total += weight(outline - general) if known and outline != 0.0 else 0.0
     if known and radius > 0.0:

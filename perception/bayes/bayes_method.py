@@ -23,7 +23,7 @@ from perception.bayes.inference.kernel_settings import (
     copied,
     make_settings,
 )
-from perception.bayes.memory.elements import MAX_POLYGONS
+from perception.bayes.memory.elements import MAX_POLYGONS, round_label
 from perception.bayes.memory.job_records import NO_JOB, REFINEMENT
 from perception.bayes.memory.polygon_parameters import POLYGON_PROBABILITY
 from perception.bayes.memory.state import ESTABLISHED, FREE, Memory
@@ -38,7 +38,6 @@ from perception.bayes.reports.object_report import (
     other_circles,
     other_objects,
     polygon_object,
-    rival_label,
 )
 from perception.bayes.segments.pinned_segments import Pins
 from perception.bayes.segments.segment_list import count_again, count_map, drawn, mapped_segments
@@ -337,8 +336,8 @@ class BayesPerception:
             if t >= 0:
                 name = self._outlines[memory.polygons["model"][t]]
             else:
-                x, y, radius, kind = (memory.circles[field][row].item() for field in ("x", "y", "radius", "kind"))
-                name = self._round[kind] if kind < p[0].model_count else rival_label(memory, x, y, radius)
+                radius, kind = (memory.circles[field][row].item() for field in ("radius", "kind"))
+                name = self._round[kind] if kind < p[0].model_count else round_label(radius)
             return evidence_of(memory, p, row, number, name, alternative_labels(p, self._round))
 
     def shift_object(self, number: int, dx: float, dy: float) -> None:

@@ -13,7 +13,6 @@ from perception.bayes.circles.alternatives import fit_other_circle, fit_other_li
 from perception.bayes.circles.heard_rays import try_other_rays
 from perception.bayes.inference.beam import assume_rays
 from perception.bayes.inference.cross_path import is_crossed
-from perception.bayes.inference.lines import enter_line
 from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.inference.occlusion import keep_relevant
 from perception.bayes.inference.outline_map import (
@@ -37,8 +36,6 @@ from perception.bayes.memory.parameters import (
     FACING_RADII,
     FIRST_FIT_SOFTNESS,
     FIT_SOFTNESS,
-    LINE_LENGTH_MIN_M,
-    NEW_LINE_HITS_MIN,
     OTHER_FIT_STEPS,
     OUTLINE_CELL_M,
     RIVAL_OVER_UNKNOWN_NAT,
@@ -313,9 +310,6 @@ def try_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: in
     bearing = mean_bearing(scratch.readings[:n], scratch.predicted, x, y, p[0].gate_m)
     own = llr + (prior if kind < p[0].model_count else 0.0)
     if fit_other_line(s, p, n, (x, y, radius), bearing, OTHER_FIT_STEPS) > own + SWITCH_LEAD_NAT:
-        line = scratch.line_score
-        if line.hits >= NEW_LINE_HITS_MIN and line.high - line.low > LINE_LENGTH_MIN_M:
-            enter_line(s, scratch.line_fit, x, y, line)
         return UNSUPPORTED
     chosen, best, best_x, best_y = best_circle(s, p, kind, n, (x, y, radius), bearing, own)
     if chosen == kind and llr < p[0].unknown_nat * near:

@@ -18,7 +18,6 @@ from config.robot import RingConfig
 from config.settings import BayesConfig
 from perception.bayes.inference.likelihood import build_levels, build_table
 from perception.bayes.memory.parameters import (
-    ASSOCIATING_LINE_M,
     BACKGROUND_RANGE_M,
     COMPARE_ALL_BELOW,
     DIFFUSE_SILENCE,
@@ -218,7 +217,6 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: Bayes
     it.history_spacing_m = HISTORY_SPACING_M
     it.pair_gap_s = PAIR_GAP_S
     it.compare_all_below = COMPARE_ALL_BELOW
-    it.associating_line_m = ASSOCIATING_LINE_M
     it.hypothesis_sigma_m = HYPOTHESIS_SIGMA_MAX_M
     it.idle_firings = IDLE_FIRINGS
     it.final_refinements = FINAL_REFINEMENTS

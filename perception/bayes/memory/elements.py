@@ -17,8 +17,6 @@ BEARING_BINS: Final = 36
 
 BIN_CAPACITY: Final = 20
 """Readings in a bin; the newest replaces the oldest."""
-MAX_LINES: Final = 24
-"""Lines, each the wall or the side of an object, at a time; a new one replaces the least credible."""
 HISTORY: Final = 28
 """Readings kept of each sensor, hits and silences of any object."""
 CROSS_EVERY: Final = 7

@@ -112,56 +112,6 @@ HYPOTHESIS_SIGMA_MAX_M: Final = 0.7 * FOOT_M
 HYPOTHESES_PER_FIRING: Final = 2
 """Greatest number of hypotheses computed per firing: the bound on the work."""
 
-# --- Lines and walls -----------------------------------------------------------------------------------------------
-
-PARALLEL_COS: Final = 0.98
-"""Two lines or segments are parallel from this cosine (11°) on: lines that are may be one, segments make the same
-request."""
-LINE_SAME_M: Final = 0.4 * FOOT_M
-"""Greatest distance, across, of a parallel new line from a known one that is the same."""
-LINE_JOIN_M: Final = 1.0 * FOOT_M
-"""Greatest distance beyond the ends of a known line at which a parallel new one is the same."""
-LINE_ANGLE_VARIANCE_RAD2: Final = 0.02
-"""Variance of a new line's direction, rad²: its standard deviation is 8°."""
-LINE_DISTANCE_VARIANCE_M2: Final = 0.01 * FOOT_M * FOOT_M
-"""Variance of a new line's distance from its origin."""
-LINE_ANGLE_DRIFT_RAD2: Final = 1e-8
-"""Variance of a line's direction that each echo adds, rad², so that the line keeps following."""
-LINE_DISTANCE_DRIFT_M2: Final = 1e-6 * FOOT_M * FOOT_M
-"""Variance of a line's distance that each echo adds."""
-LINE_FRONT_COS: Final = 0.8
-"""Least cosine between a sensor's axis and a line's normal at which it observes the line."""
-LINE_SLACK_M: Final = 0.02 * FOOT_M
-"""Error of an explained range allowed beyond the noise."""
-LINE_GROW_M: Final = 0.5 * FOOT_M
-"""A line grows by echoes this far beyond its ends."""
-LINE_SILENCE_WITHIN_M: Final = 0.2 * FOOT_M
-"""Silence counts this far inside its ends."""
-LINE_EDGE_SLACK_M: Final = 0.05 * FOOT_M
-"""Further slack of a range that a line explains where a beam's edge meets it."""
-LINE_EDGE_GROW_M: Final = 0.7 * FOOT_M
-"""A line grows by such echoes this far beyond its ends."""
-LINE_EDGE_COS: Final = 0.1
-"""Such echoes count up to this cosine beyond the beam's edge."""
-LINE_START_LOG_ODDS: Final = 3.0
-"""Log odds of a new line."""
-LINE_LOG_ODDS_MAX: Final = 6.0
-"""Greatest log odds of a line."""
-LINE_ECHO_LOG_ODDS: Final = 0.5
-"""What an echo adds to a line's log odds."""
-LINE_LENGTH_MIN_M: Final = 0.8 * FOOT_M
-"""Least length of a line that is kept."""
-NEW_LINE_HITS_MIN: Final = 8.0
-"""Least hits of a new line that is kept."""
-REPLACING_LINE_HITS_MIN: Final = 6.0
-"""Least hits of a line that is kept when it replaces a circle."""
-ASSOCIATING_LINE_M: Final = 4.0 * FOOT_M
-"""Least length of a line that takes readings from other explanations."""
-WALL_ECHOES_MIN: Final = 10.0
-"""A wall is a line that explained more echoes than this."""
-WALL_LENGTH_MIN_M: Final = 2.0 * FOOT_M
-"""A wall is a line longer than this."""
-
 # --- New circle tracks ---------------------------------------------------------------------------------------------
 
 RIVAL_RADII_M: Final = (0.0, 0.35 * FOOT_M, 2.2 * FOOT_M)
@@ -247,14 +197,10 @@ SWITCH_UNSEEN: Final = 4
 """Unseen readings that a change of kind, or of the radius, counts as, so that the track is refined."""
 CORNER_MISS_SHARE: Final = 0.5
 """Share of the evidence of missed echoes against the circle that also counts against a corner."""
-CIRCLE_WALL_BEYOND_M: Final = 8.0 * FOOT_M
-"""A centre may lie in a wall up to this far beyond its ends."""
-CIRCLE_WALL_BEHIND: Final = -0.85
-"""A centre lies in a wall from so many radii on before its face; a negative number is behind it."""
 WALL_FRONT_RADII: Final = 0.7
 """A centre lies in a wall up to so many radii before its face."""
 IN_WALL_NAT: Final = -8.0
-"""Log prior of a body whose centre lies in a wall."""
+"""Log prior ratio of a body against the walls that explain its readings."""
 ESTABLISH_PROBABILITY: Final = 0.7
 """Least probability of a track that is established."""
 ESTABLISH_HITS: Final = 8.0
@@ -332,8 +278,6 @@ PLACED_SIGMA_M: Final = 0.15
 """Standard deviation of a position that a user gave: it is wrong by a decimetre or two."""
 CIRCLE_INFLATION: Final = 1.1
 """Factor on a circle's covariance when it is reported."""
-ROOM_CORNER_M: Final = 1.0 * FOOT_M
-"""A point this near to a wall's line is a corner of the room, not an edge of an object."""
 POST_RADIUS_M: Final = 1.0 * FOOT_M
 """A round rival thinner than this is a post, a thicker one a barrel."""
 UNKNOWN_HITS_MIN: Final = 5.0

@@ -69,6 +69,8 @@ RESTART_ROUNDS: Final = 5
 
 REQUEST_SAME_M: Final = 0.25 * FOOT_M
 """A segment this near to a parallel one makes the same request."""
+PARALLEL_COS: Final = 0.98
+"""Two segments are parallel from this cosine (11°) on."""
 POLYGON_AROUND_M: Final = 0.3 * FOOT_M
 """Segments up to this far off the farthest vertex may attract the body; circles up to there stand in its place."""
 POLYGON_RELAXATION_STEPS: Final = 3
@@ -158,16 +160,8 @@ OVERLAP_RADII: Final = 1.8
 
 # --- Walls and circles in a polygon's place ------------------------------------------------------------------------
 
-POLYGON_WALL_ECHOES_MIN: Final = 12.0
-"""Least echoes of a line that replaces a body."""
 POLYGON_WALL_LENGTH_RADII: Final = 3.0
 """Least length of such a wall, in inner radii."""
-POLYGON_WALL_BEHIND: Final = -1.15
-"""A body is a wall from so many inner radii on before its face; a negative number is behind it."""
-POLYGON_WALL_SHARE: Final = 0.6
-"""A body is a wall only if that explains this many readings per hit of it: bodies in a row have a line in common."""
-POLYGON_WALL_BEYOND_M: Final = 2.0 * FOOT_M
-"""Distance beyond the ends of a line at which a body may still be a part of it."""
 
 # --- Which polygons are reported, and how --------------------------------------------------------------------------
 

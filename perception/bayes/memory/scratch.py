@@ -13,7 +13,6 @@ from perception.bayes.memory.elements import (
     COMPARED_MAX,
     CROSS_HISTORY,
     GRID_CELLS,
-    MAX_LINES,
     PAIRS_PER_SENSOR,
     MappedSegment,
     Pose,
@@ -25,9 +24,7 @@ from perception.records import Record, Records
 
 UNEXPLAINED: Final = -1
 """Value of `Scratch.explained_by` of a reading that nothing explains; circle tracks have their own numbers."""
-ON_LINE: Final = UNEXPLAINED - 1
-"""This minus k: line k explains it."""
-PROPOSED: Final = ON_LINE - MAX_LINES
+PROPOSED: Final = UNEXPLAINED - 1
 """A hypothesis was tried on it."""
 POLYGON: Final = TRACKS_MAX
 """This plus k: polygon k explains it."""

@@ -128,8 +128,6 @@ class Settings(Record):
     """Two centres nearer than this are one object."""
     compare_all_below: int
     """With fewer readings than this each refinement compares all alternatives."""
-    associating_line_m: float
-    """Least length of a line that takes readings from other explanations."""
     attempts_per_firing: int
     """Segments examined for hypotheses per firing."""
     hypothesis_sigma_m: float

@@ -20,7 +20,6 @@ from perception.bayes.memory.elements import (
     BUCKETS,
     CROSS_HISTORY,
     HISTORY,
-    MAX_LINES,
     MAX_POLYGONS,
     POLYGON_BEARING_BINS,
     POLYGON_BIN_CAPACITY,
@@ -82,6 +81,8 @@ class Sensor(Record):
     """The newest of them that in turn differ from `last`."""
     crossed: Annotated[Reading, UNHEARD]
     """Where it stood when others last listened to it; without a range."""
+    tried: Count
+    """`State.segments_numbered` when one of its segments last started a hypothesis."""
 
 
 class Bucket(Record):
@@ -92,30 +93,6 @@ class Bucket(Record):
     count: Count
     """Segments put in since the cell took the bucket."""
     segments: Annotated[Records[MappedSegment], BUCKET_CAPACITY]
-
-
-class Line(Record):
-    """A wall, or a line that may become one; its normal and distance refer to a local origin."""
-
-    normal_x: Place
-    normal_y: Place
-    distance: Place
-    """From the origin along the normal, m."""
-    origin_x: Place
-    origin_y: Place
-    variance_angle: Finite
-    """rad²"""
-    covariance: Finite
-    """m·rad"""
-    variance_distance: Finite
-    """m²"""
-    low: Place
-    """Extent along the line, m."""
-    high: Place
-    log_odds: Annotated[float, Bound(-700.0, 700.0)]
-    """Log odds that it is still there."""
-    echoes: Finite
-    """Echoes that it explained; 0 where the place is free."""
 
 
 class CircleBin(Record):
@@ -286,7 +263,6 @@ class State(Record):
     sensors: Annotated[Records[Sensor], SENSORS_MAX]
     buckets: Annotated[Records[Bucket], BUCKETS]
     """The outline map."""
-    lines: Annotated[Records[Line], MAX_LINES]
     room: WallMap
     polygons: Annotated[Records[PolygonTrack], MAX_POLYGONS]
     rejections: Annotated[Records[Rejection], REJECTIONS_MAX]
@@ -333,9 +309,8 @@ class Memory:
         return self.state["polygons"][0]  # type: ignore[no-any-return]  # numpy types a field as Any
 
     def clear_walls(self) -> None:
-        """Clear walls, corners and lines, and the readings from which new ones come."""
-        for part in ("room", "lines"):
-            self.state[part].view(np.uint8)[...] = 0
+        """Clear walls and corners, and the readings from which new ones come."""
+        self.state["room"].view(np.uint8)[...] = 0
 
     def clear(self) -> None:
         """Clear the memory, except the numbers assigned so far."""

@@ -5,74 +5,16 @@ from __future__ import annotations
 import math
 
 from perception.bayes.inference.beam import assume_rays
-from perception.bayes.inference.cross_path import over_line
 from perception.bayes.inference.likelihood import bounded_exp
-from perception.bayes.inference.lines import off_and_along, reaches
-from perception.bayes.inference.noise_estimation import noise_variance, tolerance_m
+from perception.bayes.inference.noise_estimation import noise_variance
 from perception.bayes.inference.range_fit import fit_circle, score_circle
-from perception.bayes.memory.elements import MAX_LINES, Reading
-from perception.bayes.memory.parameters import FIT_SOFTNESS, OTHER_FIT_STEPS, SWITCH_LEAD_NAT, WALL_FRONT_RADII
+from perception.bayes.memory.parameters import FIT_SOFTNESS, OTHER_FIT_STEPS, SWITCH_LEAD_NAT
 from perception.bayes.memory.polygon_parameters import (
     POLYGON_AROUND_M,
-    POLYGON_WALL_BEHIND,
-    POLYGON_WALL_BEYOND_M,
-    POLYGON_WALL_ECHOES_MIN,
-    POLYGON_WALL_LENGTH_RADII,
-    POLYGON_WALL_SHARE,
 )
 from perception.bayes.memory.settings_record import SettingsRecord
-from perception.bayes.memory.state import ESTABLISHED, FREE, CircleTracks, Line, PolygonTrack, StateRecord
+from perception.bayes.memory.state import ESTABLISHED, FREE, CircleTracks, PolygonTrack, StateRecord
 from perception.kernel import kernel
-from perception.records import Records
-
-
-@kernel
-def count_on_line(readings: Records[Reading], line: Line, cos_may: float, tight: float) -> int:
-    """Return the number of readings that a line explains.
-
-    Parameters
-    ----------
-    readings : (n,) Reading
-        Raw ranges.
-    line : Line
-        The line.
-    cos_may : float
-        As in `Settings`.
-    tight : float
-        Greatest error of an explained range, m.
-    """
-    explained = 0
-    for j in range(len(readings)):
-        q = readings[j]
-        ahead, _ = off_and_along(line, q.x, q.y)
-        towards = line.normal_x * q.axis_x + line.normal_y * q.axis_y
-        side = 1.0 if ahead > 0.0 else -1.0
-        half, _, _ = over_line(q, side * line.normal_x, side * line.normal_y, abs(ahead))
-        if abs(towards) >= cos_may and towards * ahead > 0.0 and abs(q.range_m - half) < tight:
-            explained += 1
-    return explained
-
-
-@kernel
-def is_part_of_wall(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> bool:
-    """Return whether a polygon's track is part of a wall: it lies on a line that explains its readings as well."""
-    inner = p[0].polygons[track.model].inner_radius_m
-    readings = s[0].job_readings[: s[0].job.reading_count]
-    var0, rel2 = noise_variance(s, p)
-    for k in range(MAX_LINES):
-        line = s[0].lines[k]
-        if line.echoes > POLYGON_WALL_ECHOES_MIN and line.high - line.low > max(
-            p[0].associating_line_m, POLYGON_WALL_LENGTH_RADII * inner
-        ):
-            off, along = off_and_along(line, track.x, track.y)
-            if (
-                reaches(line, along, POLYGON_WALL_BEYOND_M)
-                and POLYGON_WALL_BEHIND * inner < off < WALL_FRONT_RADII * inner
-            ):
-                tight = tolerance_m(p[0].half_resolution_m, var0 + rel2 * off * off)
-                if count_on_line(readings, line, p[0].cos_may_answer, tight) >= POLYGON_WALL_SHARE * track.hits:
-                    return True
-    return False
 
 
 @kernel

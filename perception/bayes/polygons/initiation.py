@@ -19,13 +19,14 @@ from perception.bayes.inference.reservoir import copy_reading, keep_reading
 from perception.bayes.inference.track_labels import assign_number, clear_track, free_track, is_rejected
 from perception.bayes.memory.elements import ATTRACTING_MAX, MAX_POLYGONS, REQUESTS_MAX, Reading
 from perception.bayes.memory.job_records import INITIATION
-from perception.bayes.memory.parameters import OUTLINE_CELL_M, PARALLEL_COS
+from perception.bayes.memory.parameters import OUTLINE_CELL_M
 from perception.bayes.memory.polygon_parameters import (
     APART_WHOLE,
     CHALLENGE_UNSEEN,
     COLLECTING_COST,
     FINE_ROUNDS,
     FINE_STEP_M,
+    PARALLEL_COS,
     POLYGON_AROUND_M,
     POLYGON_HITS_MIN,
     POLYGON_RELAXATION_STEPS,

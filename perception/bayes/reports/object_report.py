@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -14,18 +13,14 @@ from perception.bayes.memory.parameters import (
     CIRCLE_INFLATION,
     GATE_M,
     PLACED_SIGMA_M,
-    ROOM_CORNER_M,
     ROOM_MARGIN_M,
     UNKNOWN_HITS_MIN,
-    WALL_ECHOES_MIN,
-    WALL_LENGTH_MIN_M,
 )
 from perception.bayes.memory.polygon_parameters import EDGE_REACH_M, POLYGON_INFLATION, POLYGON_TURN_SIGMA_RAD
 from perception.bayes.memory.settings_record import SettingsRecord
 from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, PLACED, Memory, PolygonTrack
 from perception.bayes.reports.claimed_echoes import own_echoes
 from perception.bayes.tracks.track_archive import TrackArchive
-from perception.bayes.walls.crossing import CORNER_SINE_MIN
 from perception.bayes.walls.points import SPREAD_MIN_RAD
 from perception.bayes.walls.report import has_mirrors, room_report
 from perception.detected_object import DetectedObject, wall_between, worst_sigma
@@ -148,13 +143,6 @@ def archived_models(
         yield polygon_object(track, p, outlines[track.model], float(track.probability))
 
 
-def known_walls(memory: Memory) -> Structured:
-    """Return the lines that recognition takes for walls, as records of `state.Line`."""
-    lines = memory.state["lines"][0]
-    is_wall = (lines["echoes"] > WALL_ECHOES_MIN) & (lines["high"] - lines["low"] > WALL_LENGTH_MIN_M)
-    return lines[is_wall]
-
-
 def wall_object(segment: Row) -> DetectedObject:
     """Return a `WallSegment` as a reported object."""
     x1, y1, x2, y2, variance_across, variance_turn, echoes, log_odds, number = segment
@@ -176,32 +164,6 @@ def corner_object(corner: Row) -> DetectedObject:
         probability,
         (xx, xy, yy),
     )
-
-
-def rival_label(memory: Memory, x: float, y: float, radius: float) -> str:
-    """Return the label of a circle that is not a model.
-
-    Parameters
-    ----------
-    memory : Memory
-        Its walls tell a corner from an edge: an inside corner has two of them, and lies before both.
-    x, y, radius : float
-        The circle, m.
-    """
-    if radius > 0.0:
-        return round_label(radius)
-    sides = []
-    for line in known_walls(memory):
-        nx, ny = line["normal_x"], line["normal_y"]
-        dx, dy = x - line["origin_x"], y - line["origin_y"]
-        along = -ny * dx + nx * dy
-        is_within = line["low"] - ROOM_CORNER_M < along < line["high"] + ROOM_CORNER_M
-        if is_within and abs(nx * dx + ny * dy - line["distance"]) < ROOM_CORNER_M:
-            sides.append((nx, ny, 1.0 if abs(line["low"] - along) < abs(line["high"] - along) else -1.0))
-    for (ax, ay, way), (bx, by, other_way) in itertools.combinations(sides, 2):
-        if way != other_way and way * (ax * by - ay * bx) < -CORNER_SINE_MIN:
-            return "inside corner"
-    return "edge"
 
 
 def wall_edge(surfaces: Floats, x: float, y: float, radius: float) -> tuple[float, float] | None:
@@ -315,7 +277,7 @@ def other_circles(
     are_mirrors = has_mirrors(memory)
     for at, *row, probability, status, kind, radius in zip(shown.tolist(), *columns, strict=True):
         is_rival = status == ESTABLISHED and kind >= models and probability >= least
-        label = rival_label(memory, row[0], row[1], radius) if is_rival else "unknown"
+        label = round_label(radius) if is_rival else "unknown"
         if label == "edge" and are_mirrors and is_corner_of_mirrors(circles[at]):
             label = "inside corner"
         edge = wall_edge(surfaces, row[0], row[1], radius) if label == "post" else None

@@ -10,7 +10,6 @@ import math
 from perception.bayes.circles.initiation import initiate_circle
 from perception.bayes.inference.beam import answer
 from perception.bayes.inference.cross_path import is_crossed, is_near_circle
-from perception.bayes.inference.lines import update_lines
 from perception.bayes.inference.noise_estimation import add_roughness, choose_noise, noise_variance, tolerance_m
 from perception.bayes.inference.occlusion import is_elsewhere
 from perception.bayes.inference.placement import COORDINATE_MAX_M, place_readings
@@ -25,7 +24,7 @@ from perception.bayes.memory.parameters import (
 )
 from perception.bayes.memory.scratch import PROPOSED, UNEXPLAINED, PairSegment
 from perception.bayes.memory.settings_record import SettingsRecord
-from perception.bayes.memory.state import ESTABLISHED, FREE, TENTATIVE, CircleTracks, StateRecord
+from perception.bayes.memory.state import ESTABLISHED, FREE, CircleTracks, StateRecord
 from perception.bayes.polygons.initiation import request_polygon
 from perception.bayes.segments.pairing import make_segments
 from perception.bayes.tracks.model_check import count_surroundings
@@ -153,7 +152,7 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
         for i in range(m + s[0].scratch.crosses):
             q = s[0].scratch.fired[i]
             owner = s[0].scratch.explained_by[i]
-            is_own = owner in (UNEXPLAINED, t) or (owner < 0 and track.status != TENTATIVE)
+            is_own = owner in (UNEXPLAINED, t)
             if 0 <= owner < len(tracks) and not is_own:  # a part of the same body answered
                 is_own = not is_elsewhere(tracks[owner], p, cx, cy, track.radius)
             says = bears_on_circle(q, cx, cy, track.radius, s[0].rays, owner == UNEXPLAINED, is_own, p)
@@ -202,8 +201,10 @@ def update_history(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> 
 
 
 @kernel
-def surest_segment(segments: Records[PairSegment], s: StateRecord, p: SettingsRecord) -> int:
-    """Return the index of the unexplained segment that locates a centre behind it best; −1 where none is good enough.
+def next_segment(segments: Records[PairSegment], s: StateRecord, p: SettingsRecord, in_turn: bool) -> int:
+    """Return the index of the unexplained segment to start a hypothesis from; −1 where none locates a centre well.
+
+    It is the one that locates a centre behind it best, or the best of the sensor that was tried longest ago.
 
     Parameters
     ----------
@@ -211,23 +212,29 @@ def surest_segment(segments: Records[PairSegment], s: StateRecord, p: SettingsRe
         Segments of this firing.
     s, p
         Memory and settings.
+    in_turn : bool
+        Whether the sensors take turns.
     """
     chosen = -1
-    best = p[0].hypothesis_sigma_m
+    best = math.inf
+    longest_ago = 0
     for k in range(len(segments)):
         i = segments[k].reading
         r = s[0].scratch.fired[i].range_m
         if s[0].scratch.explained_by[i] == UNEXPLAINED and r <= p[0].pair_range_max_m:
             sigma = segments[k].sigma_direction * (r + p[0].circles[0].radius_m)
-            if sigma < best:
+            tried = s[0].sensors[s[0].scratch.fired_sensors[i]].tried if in_turn else 0
+            is_next = chosen < 0 or tried < longest_ago or (tried == longest_ago and sigma < best)
+            if sigma < p[0].hypothesis_sigma_m and is_next:
                 best = sigma
+                longest_ago = tried
                 chosen = k
     return chosen
 
 
 @kernel
 def propose(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, made: int) -> None:
-    """Start hypotheses from unexplained segments, the surest first.
+    """Start hypotheses from unexplained segments: the surest, then those of sensors in turn.
 
     Parameters
     ----------
@@ -235,11 +242,15 @@ def propose(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, made: int) 
         Memory and circles, updated, and settings.
     made : int
         Segments of this firing.
+
+    Notes
+    -----
+    By the surest alone, walls that are heard in every firing would keep a drum waiting.
     """
     segments = s[0].scratch.segments[:made]
     tries = 0
     for _ in range(p[0].attempts_per_firing):
-        chosen = surest_segment(segments, s, p)
+        chosen = next_segment(segments, s, p, tries > 0)
         if chosen < 0:
             return
         at = segments[chosen]
@@ -249,6 +260,7 @@ def propose(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, made: int) 
         for model in range(p[0].polygon_count):
             tries += request_polygon(s, model, x, y, nx, ny)
         s[0].scratch.explained_by[at.reading] = PROPOSED
+        s[0].sensors[s[0].scratch.fired_sensors[at.reading]].tried = s[0].segments_numbered
         if tries >= HYPOTHESES_PER_FIRING:
             return
 
@@ -373,7 +385,6 @@ def observe(
     (int, bool)
         Outline segments made, and whether a circle waits for refinement.
     """
-    update_lines(s, p, m)
     keep_readings(s, tracks, p, m)
     made = make_segments(s, p, m, time_s)
     update_history(s, p, m, time_s)

@@ -49,7 +49,7 @@ from perception.bayes.memory.state import (
     PolygonTrack,
     StateRecord,
 )
-from perception.bayes.polygons.alternatives import compare_circles, is_part_of_wall
+from perception.bayes.polygons.alternatives import compare_circles
 from perception.bayes.polygons.association import leave_to_next_neighbour
 from perception.bayes.polygons.initiation import advance_initiation, next_request
 from perception.bayes.polygons.job import (
@@ -175,7 +175,7 @@ def judge_polygon(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: in
     track.hits = score.hits
     track.near = score.near
     track.sure_hits = score.sure_hits
-    if (is_part_of_wall(s, p, track) or is_on_long_walls(s, p, track)) and drop_track(track):
+    if is_on_long_walls(s, p, track) and drop_track(track):
         return
     compare_circles(s, tracks, p, track)
     update_polygon_status(s, p, track)

@@ -17,7 +17,6 @@ from perception.bayes.circles.outline_check import other_bodies, outline_lead, r
 from perception.bayes.circles.posterior import posterior_circle
 from perception.bayes.inference.beam import assume_rays
 from perception.bayes.inference.likelihood import bounded_exp
-from perception.bayes.inference.lines import enter_line, is_in_wall
 from perception.bayes.inference.noise_estimation import add_residuals, noise_variance
 from perception.bayes.inference.occlusion import keep_relevant
 from perception.bayes.inference.prediction import predict_circle
@@ -35,16 +34,13 @@ from perception.bayes.memory.parameters import (
     FIT_LEAD_SIGMAS2,
     FIT_SOFTNESS,
     FITTED_REFINEMENTS,
-    IN_WALL_NAT,
     LATERAL_STEP_M,
-    LINE_LENGTH_MIN_M,
     LINE_PRIOR_NAT,
     LOST_NAT,
     MODEL_CHECK_EVERY,
     OTHER_FIT_STEPS,
     PLACED_STRAY_MAX_M,
     RANGE_VARIANCE_MIN_M2,
-    REPLACING_LINE_HITS_MIN,
     ROOT_CORRELATION_MAX,
     SWITCH_LEAD_NAT,
     SWITCH_ROOT_M,
@@ -251,9 +247,6 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
             v = fit_other_line(s, p, n, circle, bearing, OTHER_FIT_STEPS)
             track.leads[k] = v - track.log_likelihood_ratio
             if v > track.log_likelihood_ratio + max(prior, 0.0) + SWITCH_LEAD_NAT:
-                said = s[0].scratch.line_score
-                if said.hits >= REPLACING_LINE_HITS_MIN and said.high - said.low > LINE_LENGTH_MIN_M:
-                    enter_line(s, s[0].scratch.line_fit, track.x, track.y, said)
                 return False
         else:
             v = score_corner(s, p, n, track.x, track.y, track.radius, var0, rel2)
@@ -262,13 +255,13 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
 
 
 @kernel
-def existence_probability(s: StateRecord, p: SettingsRecord, track: CircleTrack, prior: float) -> float:
+def existence_probability(p: SettingsRecord, track: CircleTrack, prior: float) -> float:
     """Return the probability of a track's explanation among all: radii, line, corner, other bodies, nothing.
 
     Parameters
     ----------
-    s, p
-        Memory and settings.
+    p
+        Settings.
     track : CircleTrack
         The track.
     prior : float
@@ -277,15 +270,14 @@ def existence_probability(s: StateRecord, p: SettingsRecord, track: CircleTrack,
     kind = track.kind
     line = p[0].circle_count
     own_prior = prior if kind < p[0].model_count else 0.0
-    in_wall = IN_WALL_NAT if kind < p[0].model_count and is_in_wall(s, track.x, track.y, track.radius) else 0.0
-    own = track.log_likelihood_ratio + own_prior + in_wall
+    own = track.log_likelihood_ratio + own_prior
     total = 1.0 + bounded_exp(-own) + bounded_exp(track.unknown_nat + p[0].model_prior_nat - own)
     if kind < p[0].model_count:
         total += other_bodies(track, p)
     for k in range(line + 2):
         if k != kind and track.leads[k] != 0.0:
             lead = prior if k < p[0].model_count else (p[0].model_prior_nat + LINE_PRIOR_NAT if k == line else 0.0)
-            total += bounded_exp(track.leads[k] + lead - own_prior - in_wall)
+            total += bounded_exp(track.leads[k] + lead - own_prior)
     return 1.0 / total
 
 
@@ -332,7 +324,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     if track.kind < p[0].model_count and is_due:
         track.outline_lead = outline_lead(s, p, track, n)
         track.round_lead = round_lead(s, p, n)
-    track.probability = existence_probability(s, p, track, prior)
+    track.probability = existence_probability(p, track, prior)
     evidence = track.log_likelihood_ratio
     if (evidence < 0.0 or evidence < track.unknown_nat - SWITCH_LEAD_NAT) and drop_track(track):
         return

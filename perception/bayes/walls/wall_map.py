@@ -2,8 +2,8 @@
 
 Each echo goes to the wall that explains it best, else to one that may continue there; what no wall, corner or end
 explains may start a new wall. Ranges that pass through a wall weaken it where they do, so that doorways stay open.
-These walls are for the report; recognition has lines of its own (`perception.bayes.inference.lines`), which take
-their echoes from false round objects before they are certain.
+These walls are for the report, and withdraw the names of round objects that they explain; they take no echoes from
+round objects, which compete with a line of their own on the same readings.
 
 Kernels that call one another are compiled again with each caller, so Python calls them here one after another. What
 is rare is in numpy.

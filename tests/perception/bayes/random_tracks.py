@@ -14,7 +14,7 @@ from perception.bayes.inference import reservoir
 from perception.bayes.inference.kernel_settings import make_settings
 from perception.bayes.inference.outline_map import bucket_index
 from perception.bayes.inference.prediction import predict_circle
-from perception.bayes.memory.elements import BUCKETS, MAX_LINES, Reading
+from perception.bayes.memory.elements import BUCKETS, Reading
 from perception.bayes.memory.parameters import OUTLINE_CELL_M
 from perception.bayes.memory.scratch import Predictions
 from perception.bayes.memory.settings_record import RANGE_BINS_PER_M, Settings, SettingsRecord
@@ -25,7 +25,6 @@ from perception.records import Records, array_of, records, zeros
 from perception.sensor_mounts import mounts_array
 from perception.shared_numbers import FAR
 from tests import naive_bayes
-from tests.naive_tracks import Line
 
 SETTINGS = load_settings("hallway", ["perception.method=bayes"])
 
@@ -198,22 +197,3 @@ def add_segment(memory: Memory, row: Floats, number: int) -> int:
 def places(memory: Memory) -> Floats:
     """Return the centres of all circles, shape (n, 2), m."""
     return np.column_stack([memory.circles["x"], memory.circles["y"]])
-
-
-def line_rows(memory: Memory) -> Floats:
-    """Return the lines as rows, as `naive_tracks.Line.row` writes them: a view."""
-    return numbers(memory.state["lines"][0])
-
-
-def random_lines(rng: np.random.Generator, memory: Memory, many: int) -> dict[int, Line]:
-    """Fill some of the memory's lines at random and the others with zeros; return them by index."""
-    line_rows(memory)[...] = 0.0
-    lines = {}
-    for k in sorted(rng.choice(MAX_LINES, many, replace=False).tolist()):
-        root = np.array([[rng.uniform(0.001, 0.1), 0.0], [rng.normal(0, 0.01), rng.uniform(0.001, 0.05)]])
-        lines[k] = Line(
-            unit(rng.uniform(-math.pi, math.pi)), rng.uniform(-0.2, 2), rng.uniform(-1, 1, 2), root @ root.T,
-            -rng.uniform(0, 2), rng.uniform(0, 2), rng.uniform(0, 6), float(rng.integers(1, 30)),
-        )  # fmt: skip
-        line_rows(memory)[k] = lines[k].row()
-    return lines

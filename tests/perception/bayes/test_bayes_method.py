@@ -93,7 +93,7 @@ def test_meaningless_firings_leave_a_finite_memory(tracks: int, firings: int) ->
                 assert np.isfinite([seen.x, seen.y, seen.theta, seen.sigma, seen.score]).all()
                 assert 0.0 <= (seen.probability or 0.0) <= 1.0
         state, circles, polygons = memory.state, memory.circles, memory.polygons
-        for array in (circles, polygons, state["lines"], state["roughness_nat"], state["residuals_nat"]):
+        for array in (circles, polygons, state["roughness_nat"], state["residuals_nat"]):
             assert all(np.isfinite(leaf).all() for leaf in leaves(array))
         for array in (state["sensors"]["history"], state["buckets"]["segments"]):
             assert all(np.isfinite(leaf).all() for leaf in leaves(array))

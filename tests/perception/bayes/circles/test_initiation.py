@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
 
 from perception.bayes.circles import initiation as track_initiation
 from perception.bayes.inference.outline_map import add_to_map
 from perception.bayes.memory.elements import HISTORY
-from perception.bayes.memory.parameters import NEW_LINE_HITS_MIN, OUTLINE_CELL_M
+from perception.bayes.memory.parameters import OUTLINE_CELL_M
 from perception.bayes.memory.state import FREE, TENTATIVE, CircleTrack, Memory
 from perception.records import records, zeros
 from perception.shared_numbers import FAR
@@ -115,7 +114,7 @@ def test_nothing_is_started_without_echoes_or_on_a_rejected_place() -> None:
     assert not memory.circles["status"].any()
 
 
-def test_a_wall_is_entered_as_a_line_and_starts_no_drum() -> None:
+def test_a_wall_starts_no_drum() -> None:
     """Exact ranges to the line y = 1, heard at right angles from places 5 cm apart, 2 m away."""
     memory = new_memory()
     for i in range(10):
@@ -123,10 +122,6 @@ def test_a_wall_is_entered_as_a_line_and_starts_no_drum() -> None:
         history(memory, i)[:4] = [(0.05 * (4 * i + j) - 0.6, -1.0, 0.0, 1.0, 2.0) for j in range(4)]
     track_initiation.initiate_circle(memory.s, memory.tracks, P, 0, 0.4, 1.0, 0.0, 1.0)
     assert not memory.circles["status"].any()
-    line = memory.s[0].lines[0]
-    assert line.echoes >= NEW_LINE_HITS_MIN
-    assert (line.normal_x, line.normal_y) == pytest.approx((0.0, 1.0), abs=1e-3)
-    assert line.origin_y + line.distance == pytest.approx(1.0, abs=1e-3)
 
 
 def test_relaxation_moves_a_hypothesis_onto_the_map_and_leaves_it_without_segments() -> None:

@@ -107,7 +107,6 @@ def test_no_reading_ends_a_circle_that_a_user_marked_nor_makes_it_something_else
     tentative = 0
     for turn in range(15):
         circles.view(np.uint8)[...] = 0
-        memory.state["lines"].view(np.uint8)[...] = 0
         random_track(rng, memory, 0, int(rng.choice([TENTATIVE, ESTABLISHED])))
         track.root_xx = track.root_yy = 0.01
         track.number, track.marks = 9, mark

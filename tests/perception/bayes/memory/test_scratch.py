@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from config.robot import SENSORS_MAX
 from config.settings import TRACKS_MAX
-from perception.bayes.memory.elements import MAX_LINES, MAX_POLYGONS, PAIRS_PER_SENSOR
+from perception.bayes.memory.elements import MAX_POLYGONS, PAIRS_PER_SENSOR
 from perception.bayes.memory.parameters import BASELINES
-from perception.bayes.memory.scratch import ON_LINE, POLYGON, PROPOSED, UNEXPLAINED, Scratch
+from perception.bayes.memory.scratch import POLYGON, PROPOSED, UNEXPLAINED, Scratch
 
 
 def test_no_two_explanations_of_a_reading_have_the_same_code() -> None:
-    lines = [ON_LINE - k for k in range(MAX_LINES)]
     polygons = [POLYGON + k for k in range(MAX_POLYGONS)]
-    codes = [UNEXPLAINED, PROPOSED, *lines, *polygons, *range(TRACKS_MAX)]
+    codes = [UNEXPLAINED, PROPOSED, *polygons, *range(TRACKS_MAX)]
     assert len(set(codes)) == len(codes)
 
 

@@ -25,7 +25,6 @@ def test_a_cleared_memory_equals_a_new_one_except_the_numbers_that_were_given() 
     memory.state["scratch"].view(np.uint8)[...] = 7
     memory.circles.view(np.uint8)[...] = 7
     memory.state["buckets"]["count"] = 3
-    memory.state["lines"]["echoes"] = 3.0
     memory.state["objects_numbered"], memory.state["segments_numbered"] = 11, 12
     array = memory.state
     memory.clear()
@@ -46,7 +45,7 @@ def test_kernels_and_numpy_see_the_same_memory() -> None:
 
 def test_walls_are_cleared_alone() -> None:
     memory, new = Memory(24, 5), Memory(24, 5)
-    memory.state["room"]["walls"]["weight"] = memory.state["lines"]["echoes"] = 3.0
+    memory.state["room"]["walls"]["weight"] = 3.0
     memory.state["room"]["remembered_count"] = memory.state["segments_held"] = 9
     memory.clear_walls()
     assert memory.state["segments_held"][0] == 9

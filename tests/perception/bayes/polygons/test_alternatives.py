@@ -1,4 +1,4 @@
-"""Alternatives of a polygon: the wall it is part of, the best circle in its place, and its probability among them."""
+"""Alternatives of a polygon: the best circle in its place, and its probability among them."""
 
 from __future__ import annotations
 
@@ -9,68 +9,13 @@ import pytest
 
 from perception.bayes.memory.state import CONFIRMED, ESTABLISHED, FREE, Memory
 from perception.bayes.polygons import alternatives
-from perception.kernel import Floats
 from perception.shared_numbers import FAR
 from tests import naive_bayes
 from tests.perception.bayes.box_readings import LEVEL, P, S, enter_job, heard
-from tests.perception.bayes.random_tracks import COSINES, SENSORS, TRACKS, noises, readings_of, unit
+from tests.perception.bayes.random_tracks import COSINES, SENSORS, TRACKS, noises, unit
 
 INNER = float(S.polygons[0].inner_radius_m)
 RADII = [float(it.radius_m) for it in S.circles[: S.circle_count]]
-
-
-def memory_with_wall(echoes: float = 20.0, length: float = 4.0) -> Memory:
-    """Return a memory with a wall along y = 1, from x = −length / 2 on, heard from below."""
-    memory = Memory(SENSORS, TRACKS)
-    line = memory.s[0].lines[3]
-    line.normal_y, line.distance, line.origin_y = 1.0, 0.5, 0.5
-    line.low, line.high, line.echoes = -0.5 * length, 0.5 * length, echoes
-    return memory
-
-
-def wall_readings(n: int) -> Floats:
-    """Return exact ranges to the line y = 1 at right angles, 0.1 m apart."""
-    return np.array([(0.1 * j - 0.05 * n, -0.5, 0.0, 1.0, 1.5) for j in range(n)])
-
-
-def test_readings_on_a_line_are_counted_from_both_of_its_sides() -> None:
-    memory = memory_with_wall()
-    line = memory.s[0].lines[3]
-    w = np.array(
-        [
-            (0.0, 0.0, 0.0, 1.0, 1.02),
-            (0.0, 0.0, 0.0, 1.0, 1.04),
-            (0.0, 2.0, 0.0, -1.0, 1.0),
-            (0.0, 2.0, 0.0, 1.0, 1.0),
-            (0.0, 0.0, *unit(math.radians(60.0)), 1.0),
-        ]
-    )
-    counted = [alternatives.count_on_line(readings_of(q[None]), line, float(S.cos_may_answer), 0.03) for q in w]
-    assert counted == [1, 0, 1, 0, 0]
-    assert alternatives.count_on_line(readings_of(w), line, float(S.cos_may_answer), 0.03) == 2
-
-
-@pytest.mark.parametrize(
-    ("y", "hits", "echoes", "length", "is_wall"),
-    [
-        (1.2, 10.0, 20.0, 4.0, True),
-        (1.0 - 0.69 * INNER, 10.0, 20.0, 4.0, True),
-        (1.0 - 0.71 * INNER, 10.0, 20.0, 4.0, False),
-        (1.0 + 1.14 * INNER, 10.0, 20.0, 4.0, True),
-        (1.0 + 1.16 * INNER, 10.0, 20.0, 4.0, False),
-        (1.2, 17.0, 20.0, 4.0, False),
-        (1.2, 10.0, 12.0, 4.0, False),
-        (1.2, 10.0, 20.0, 1.2, False),
-    ],
-)
-def test_a_polygon_on_a_long_line_that_explains_its_readings_is_part_of_the_wall(
-    y: float, hits: float, echoes: float, length: float, is_wall: bool
-) -> None:
-    memory = memory_with_wall(echoes, length)
-    enter_job(memory, wall_readings(10), LEVEL)
-    track = memory.s[0].polygons[0]
-    track.status, track.y, track.hits = ESTABLISHED, y, hits
-    assert alternatives.is_part_of_wall(memory.s, P, track) == is_wall
 
 
 def test_the_best_circle_is_the_likeliest_of_all_radii_on_the_jobs_readings() -> None:

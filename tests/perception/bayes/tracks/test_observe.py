@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perception.bayes.memory.elements import BEARING_BINS, BIN_CAPACITY
-from perception.bayes.memory.scratch import ON_LINE, UNEXPLAINED
+from perception.bayes.memory.scratch import UNEXPLAINED
 from perception.bayes.memory.state import ESTABLISHED, FREE, TENTATIVE
 from perception.bayes.tracks import observe
 from tests import naive_occlusion, naive_tracks
@@ -58,7 +58,6 @@ def test_readings_go_to_the_circle_with_the_least_error_and_every_circle_they_be
         ]
         assert explained_by.tolist() == owner
         taken += sum(o >= 0 for o in owner)
-        explained_by[rng.random(SENSORS) < 0.2] = ON_LINE - 3
         observe.keep_readings(memory.s, memory.tracks, P, SENSORS)
         for k in range(TRACKS):
             status, centre, radius = circles["status"][k], place_of(memory, k), float(circles["radius"][k])
@@ -72,7 +71,7 @@ def test_readings_go_to_the_circle_with_the_least_error_and_every_circle_they_be
             want = [
                 q for q, o in zip(fired.copy(), explained_by.tolist(), strict=True)
                 if status != FREE and naive_tracks.bears_on(
-                    q, centre, radius, o == -1, o in (-1, k, *same) or (o < 0 and status == ESTABLISHED),
+                    q, centre, radius, o == -1, o in (-1, k, *same),
                     S.cos_may_answer, S.cos_must_answer, S.gate_m, S.pair_range_max_m,
                 )
             ]  # fmt: skip
@@ -124,5 +123,22 @@ def test_the_surest_unexplained_segment_in_reach_is_proposed_first() -> None:
     scratch["fired"]["range_m"][0, 4] = S.pair_range_max_m + 0.1
     made = memory.s[0].scratch.segments[:5]
     for chosen in (0, 1, -1):
-        assert observe.surest_segment(made, memory.s, P) == chosen
+        assert observe.next_segment(made, memory.s, P, in_turn=False) == chosen
         explained_by[chosen] = 7
+
+
+def test_a_sensor_whose_segment_started_a_hypothesis_waits_for_the_others() -> None:
+    memory = new_memory()
+    scratch = memory.state["scratch"]
+    segments, explained_by = scratch["segments"][0], scratch["explained_by"][0]
+    segments["reading"][:3], segments["sigma_direction"][:3] = (0, 1, 2), (0.01, 0.03, 0.02)
+    scratch["fired_sensors"][0, :3] = (7, 3, 5)
+    numbers(scratch["fired"][0])[:3] = (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0)
+    made, tried = memory.s[0].scratch.segments[:3], []
+    for firing in range(1, 7):
+        explained_by[:3] = UNEXPLAINED
+        memory.state["segments_numbered"] = firing
+        chosen = observe.next_segment(made, memory.s, P, in_turn=firing > 1)
+        memory.s[0].sensors[scratch["fired_sensors"][0, chosen]].tried = firing
+        tried.append(chosen)
+    assert tried == [0, 2, 1, 0, 2, 1], "the surest first, then in turn"

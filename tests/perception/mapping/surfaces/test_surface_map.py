@@ -83,12 +83,17 @@ def driven() -> Perception:
 
 
 def test_walls_and_what_is_not_one_are_mapped(driven: Perception) -> None:
-    """Each wall is reported along most of its length, the doorway stays open, and the box's side is on the map."""
-    walls = [seen.ends for seen in driven.labelled_objects() if seen.ends is not None]
+    """Each wall is reported along most of its length, the doorway stays open, and the box's side is on the map.
+
+    The side may be a polyline, or its edges and what stands between them.
+    """
+    seen = driven.labelled_objects()
+    walls = [one.ends for one in seen if one.ends is not None]
+    points = [(one.x, one.y) for one in seen if one.ends is None]
     parts = [np.column_stack([one.points[:-1], one.points[1:]]) for one in driven.polylines()]
     pieces = np.concatenate([np.array(walls).reshape(-1, 4), *parts])
     shares = np.linspace(0.0, 1.0, 50)[:, None, None]
-    mapped = (pieces[:, :2] + shares * (pieces[:, 2:] - pieces[:, :2])).reshape(-1, 2)
+    mapped = np.concatenate([(pieces[:, :2] + shares * (pieces[:, 2:] - pieces[:, :2])).reshape(-1, 2), points])
     for wall in WALLS:
         along = wall[:2] + np.linspace(0.05, 0.95, 60)[:, None] * (wall[2:] - wall[:2])
         nearest = np.hypot(*(along[:, None] - mapped).transpose(2, 0, 1)).min(axis=1)
