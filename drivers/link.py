@@ -199,16 +199,13 @@ class Link:
         await line.lost.wait()
 
     def _opened(self) -> None:
-        """Call the handler of a line that has just opened."""
         self._last_error = None
         self._guard("opening", self._on_opened)
 
     def _received(self, data: bytes) -> None:
-        """Call the handler of received bytes."""
         self._guard("received data", self._on_data, data)
 
     def _lost(self, reason: str, *, has_hung_up: bool) -> None:
-        """Note why the line closed, and call the handler of its end."""
         self._line = None
         self._last_error, self.has_hung_up = reason, has_hung_up
         self._guard("closing", self._on_closed, reason)

@@ -373,7 +373,6 @@ class RobotProcess:
         self._sender.send()
 
     def _on_data(self, data: bytes) -> None:
-        """Take bytes from the line, unless they are a flood, which is held; an echo among them may begin a cycle."""
         (run_s, host_s), waiting = self._clock.both(), self._driver.firings_waiting
         if not self._budget.accepts(data, run_s):
             self._link.hold(FLOOD_HOLD_S)
