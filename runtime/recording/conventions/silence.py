@@ -42,6 +42,8 @@ LEAST_SPREAD: Final = 1e-3 / WIDTHS
 """Least standard deviation of a band, as a share of its value: for what is rounded."""
 LEAST_STEPS: Final = 0.02
 """Ranges are rounded to steps of no more than this share of what stands for silence."""
+SMOOTH: Final = 0.5
+"""Readings of silence differ from one to the next as much as from any other (1); of a wall that is passed, less."""
 TAKEN: Final = ", which is taken for silence (inf)"
 RANGES_MIN: Final = 100
 LEAP: Final = 1.25
@@ -164,13 +166,14 @@ def _most_frequent(moved: Floats, finite: Floats) -> Silence:
     most = int(counts.argmax())
     second = int(np.delete(counts, most).max(initial=1))
     if counts[most] > max(MODE_FACTOR * second, MODE_SHARE * len(finite_moved)):
-        value, band = float(values[most]), _top(finite_moved)
+        value, band = float(values[most]), _unlike_wall(_top(finite_moved), moved)
         if band is None or not band.low <= value <= band.high:
             return _one_value(value, finite)
         inside = np.count_nonzero((finite_moved >= band.low) & (finite_moved <= band.high))
         return band if inside > (1.0 + NOISY_SHARE) * counts[most] else _one_value(value, finite)
-    found = _top(finite_moved) or _spikes(moved)
-    if found is None and (wide := _band(finite_moved, GLITCHES, *DOUBTFUL)) is not None:
+    found = _unlike_wall(_top(finite_moved), moved) or _spikes(moved)
+    wide = None if found else _unlike_wall(_band(finite_moved, GLITCHES, *DOUBTFUL), moved)
+    if wide is not None:
         raise RingLogError(
             f"{wide.words.removesuffix(TAKEN)}: say --silence max if that is no echo, or --silence inf if they are "
             "ranges"
@@ -266,6 +269,23 @@ def _band(finite: Floats, glitches: float, widest: float = BAND, contrast: float
     if inside < max(least, TOP_SHARE * len(finite), 10):
         return None
     return _noisy_silence(finite, centre, spread, inside)
+
+
+def _unlike_wall(band: Silence | None, moved: Floats) -> Silence | None:
+    """Return a band, but None if each sensor's readings in it change as slowly as those of a wall along the way.
+
+    Equal readings in a row count once: a table may repeat each until the next. `moved`: as of `_most_frequent`.
+    """
+    if band is None:
+        return None
+    steps = spread = 0.0
+    for column in moved.T:
+        inside = column[(column >= band.low) & (column <= band.high)]
+        if len(inside):
+            changed = inside[np.r_[True, np.diff(inside) != 0.0]]
+            steps += float(np.square(np.diff(changed)).sum())
+            spread += 2.0 * len(changed) * float(changed.var())
+    return None if steps < SMOOTH * spread else band
 
 
 def _spread(near: Floats) -> float:

@@ -121,3 +121,14 @@ def test_a_ceiling_with_more_noise_than_surfaces_have_is_refused_with_the_option
     ):
         find_silence(rows, "auto", 1)
     assert (np.isposinf(find_silence(rows, "max", 1).applied(rows.ranges)) == is_silent).mean() > 0.99
+
+
+@pytest.mark.parametrize("sway_m", [0.03, 0.05])
+@pytest.mark.parametrize("repeated", [1, 4])
+def test_a_wall_along_which_the_robot_sways_is_no_silence(sway_m: float, repeated: int) -> None:
+    """The far wall of a corridor is at the top of all ranges, too, and was taken for silence or refused."""
+    rng, rows = np.random.default_rng(6), table(np.array([1.0]), 0.0)[0]
+    sways = sway_m * np.sin(rows.t[::repeated])
+    sides = np.column_stack([2.15 + sways, 0.55 - sways, 2.15 + sways, 0.55 - sways])
+    sides = np.repeat(sides + 0.01 * rng.standard_normal(sides.shape), repeated, axis=0)
+    assert find_silence(rows._replace(ranges=np.round(sides, 3)), "auto", 1).option == "inf"
