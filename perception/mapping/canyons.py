@@ -284,10 +284,11 @@ class CanyonMap:
     def __init__(self, sealed_m: float) -> None:
         self.sealed_m = sealed_m
         self.rows: Structured = np.zeros(CANYONS_MAX, CANYON_DTYPE)
-        """(REMEMBERED_MAX,): A number of 0 is a free row."""
+        """(CANYONS_MAX,): a number of 0 is a free row."""
         self.numbered = 0
+        """Canyons numbered so far."""
         self.firings = 0
-        """Canyons numbered, and firings, so far."""
+        """Firings so far."""
         self.is_wanted = False
         """Whether to look for canyons: a place takes a millisecond, and only a drive to a goal needs them."""
         self.is_due = False

@@ -54,7 +54,7 @@ class FleetRun:
     is_local: bool
     client: ConsoleClient | None = None
     is_over: bool = False
-    """Whether it has said that it ends."""
+    """Whether it has said that it ends, and has not been reached since."""
     problem: str = "connecting"
     """Why there is no connection; empty while there is one."""
     state: Message = field(default_factory=dict)
@@ -171,7 +171,7 @@ class Fleet:
         while True:
             try:
                 async with connect(run.url) as client:
-                    run.client, run.problem = client, ""
+                    run.client, run.problem, run.is_over = client, "", False
                     if run.halt in {"sent", "unconfirmed"}:
                         self._send_halt(run)
                     async for message in client.messages():

@@ -59,8 +59,8 @@ WARM_UP: Final = "runtime.support.kernel_warmup"
 KERNEL_COUNTS: Final = MappingProxyType(
     {
         RING: 97,
-        BAYES: 288,
-        POLYGONS: 66,
+        BAYES: 278,
+        POLYGONS: 64,
         PAPER: 7,
         LOCALIZATION: 26,
         KNOWN_ROOM: 29,

@@ -1,4 +1,4 @@
-"""The numbers that tune the Bayesian method: what one range says, the outline map, lines, circles, reports, effort.
+"""The numbers that tune the Bayesian method: what one range says, the outline map, circles, reports, effort.
 
 Those of polygon tracks are in `perception.bayes.memory.polygon_parameters`. Where a value gives no other source, it
 was tuned on random halls with the Denning's ring (docs/figures.md names them). The values hold for other rings as

@@ -161,7 +161,8 @@ OVERLAP_RADII: Final = 1.8
 # --- Walls and circles in a polygon's place ------------------------------------------------------------------------
 
 POLYGON_WALL_LENGTH_RADII: Final = 3.0
-"""Least length of such a wall, in inner radii."""
+"""Least length of a mapped wall that stands in a polygon's place: a factor on half its longest side, or on the inner
+radius where that is longer."""
 
 # --- Which polygons are reported, and how --------------------------------------------------------------------------
 

@@ -45,7 +45,7 @@ class Incidences:
     rows: Floats
     """(n, 2): factors of the point's place."""
     levels: Floats
-    """(n,): m."""
+    """(n,): what the sum is to be, m."""
 
 
 def fit_together(walls: Lines, corners: Structured, numbers: Sequence[int]) -> Floats:

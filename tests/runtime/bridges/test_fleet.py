@@ -72,6 +72,15 @@ async def test_a_halt_that_is_not_confirmed_is_shown_within_a_second() -> None:
     await fleet.close()
 
 
+def test_a_run_that_came_back_after_its_end_is_not_over() -> None:
+    async def body(case: ConsoleCase, fleet: Fleet, _now_s: list[float]) -> None:
+        fleet.runs[0].is_over = True  # it said so before it started again
+        await shows(case, fleet, "problem", "")
+        assert not fleet.runs[0].is_over
+
+    with_fleet(body)
+
+
 def test_control_of_the_run_is_left_to_its_page() -> None:
     async def body(case: ConsoleCase, fleet: Fleet, _now_s: list[float]) -> None:
         await shows(case, fleet, "problem", "")

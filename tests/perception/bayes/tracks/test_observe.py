@@ -142,3 +142,17 @@ def test_a_sensor_whose_segment_started_a_hypothesis_waits_for_the_others() -> N
         memory.s[0].sensors[scratch["fired_sensors"][0, chosen]].tried = firing
         tried.append(chosen)
     assert tried == [0, 2, 1, 0, 2, 1], "the surest first, then in turn"
+
+
+def test_a_sensor_is_noted_as_tried_when_its_segment_starts_a_hypothesis() -> None:
+    memory = new_memory()
+    scratch, tried = memory.state["scratch"], memory.state["sensors"]["tried"][0]
+    segments = scratch["segments"][0]
+    segments["reading"][:2], segments["sigma_direction"][:2], segments["normal_x"][:2] = (0, 1), (0.01, 0.3), 1.0
+    scratch["fired_sensors"][0, :2], scratch["explained_by"][0, :2] = (7, 3), UNEXPLAINED
+    numbers(scratch["fired"][0])[:2] = (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0)
+    memory.state["segments_numbered"] = 9
+    observe.propose(memory.s, memory.tracks, P, 2)
+    assert (tried[7], tried[3]) == (9, 0), "the second one locates no centre"
+    memory.clear()
+    assert not memory.state["sensors"]["tried"].any()
