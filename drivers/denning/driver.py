@@ -58,7 +58,7 @@ class DenningDriver(Session[PoseStamper]):
         self._earlier_boot: int | None = None  # boot number of the robot that answered before the present one
         self._jump: Jump | None = None  # of the clock, for which the robot is being identified
         self._decoder = Decoder("robot", midway=True)
-        self._odometry_s = self._last_frame_s = 0.0  # when the last one came
+        self._odometry_s = self._last_frame_s = self._restarted_s = 0.0  # when the last one came
         self._bad_at_odometry = 0  # corrupt frames of this line before it
         self._seq = 0
         self._flush_first = False  # whether the next write is the first on this line
@@ -303,7 +303,8 @@ class DenningDriver(Session[PoseStamper]):
         known, self._identity = self._identity, identity_of(ident)
         if known is not None and known.boot_id != ident.boot_id:
             earlier, self._earlier_boot = self._earlier_boot, known.boot_id
-            if ident.boot_id == earlier:  # no restart brings a boot number back
+            since_s, self._restarted_s = self._run_s - self._restarted_s, self._run_s
+            if diagnostics.comes_back(ident.boot_id, earlier, since_s):
                 self._go_down(diagnostics.two_robots(ident))
                 return
         self._version, self._unit_m = ident.version, 1e-6 * ident.range_unit_um

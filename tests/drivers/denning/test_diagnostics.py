@@ -60,6 +60,20 @@ def test_a_robot_that_restarts_again_and_again_is_one() -> None:
     assert harness.robot.problem is None
 
 
+def test_a_robot_whose_boot_numbers_repeat_is_one() -> None:
+    """One whose board has few random bits, or that is exchanged with another and back while the line stays open."""
+    harness = DriverHarness()
+    harness.open()
+    harness.handshake()
+    for boot_id in (0xB002, IDENT.boot_id, 0xB002):
+        harness.ident = replace(IDENT, boot_id=boot_id)
+        for k in range(60):
+            harness.run(0.1, t_us=100_000 * k)
+            assert harness.robot.problem is None
+        assert harness.state() is LineState.READY
+        assert harness.robot.take_received().rebooted
+
+
 def drive_on(harness: DriverHarness, seconds: float, t_us: int, *, deaf: bool = False, flags: int = 0) -> int:
     """Drive at 20 Hz with a robot that names the DRIVE it took last, but for the time that it is deaf."""
     last = harness.last_drive
