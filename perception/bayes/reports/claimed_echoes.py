@@ -41,7 +41,7 @@ def own_echoes(circles: Structured, surfaces: Floats, memory: Memory, p: Setting
     to = centres - sensors
     away = np.hypot(*to.T)
     is_own = (np.abs(ranges - away + circles["radius"][owner]) < p[0].gate_m) & (ranges < FAR) & (away > 0.0)
-    owner, sensors, ranges, to = owner[is_own], sensors[is_own], ranges[is_own], (to / away[:, None])[is_own]
+    owner, sensors, ranges, to = owner[is_own], sensors[is_own], ranges[is_own], to[is_own] / away[is_own, None]
     axes = np.column_stack([held["axis_x"], held["axis_y"]])[is_own]
     room = memory.state["room"][0]
     variance = float(room["variance_m2"]) + float(room["relative_variance"]) * ranges**2
