@@ -286,8 +286,9 @@ class Decoder:
 
     def __init__(self, direction: Literal["host", "robot"], *, midway: bool = False) -> None:
         self.frames = 0
+        """Frames decoded."""
         self.bad = 0
-        """Frames decoded, and frames dropped: invalid stuffing, length, checksum or content."""
+        """Frames dropped: invalid stuffing, length, checksum or content."""
         self.lost = 0
         """Frames missing by the sender's sequence numbers, among them those dropped for stuffing, length or
         checksum."""

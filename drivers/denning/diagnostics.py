@@ -13,8 +13,6 @@ from drivers.line_diagnostics import deadman_refused
 _RADIUS_TOLERANCE_MM = 1.0
 """The robot reports whole millimetres."""
 
-_TWO_RESTARTS_S = 5.0
-"""A robot takes longer to restart twice."""
 _COARSENESS, _FINE_M = 1.01, 1e-3
 """Steps of the ranges that are coarser than the robot file's by no more than this matter as little as those up to a
 millimetre."""
@@ -48,11 +46,6 @@ def wrong_robot(ident: Ident, config: RobotConfig) -> str | None:
             f"file says {radius_m:.3f} m; correct ring.radius_m, or choose the robot's own file"
         )
     return deadman_refused(ident.name, ident.deadman_ms * 1e-3, config.link)
-
-
-def comes_back(boot: int, earlier: int | None, since_s: float) -> bool:
-    """Return whether a boot number is that of the robot before last, so soon that no robot has restarted twice."""
-    return boot == earlier and since_s < _TWO_RESTARTS_S
 
 
 def two_robots(ident: Ident) -> str:

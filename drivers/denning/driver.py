@@ -9,6 +9,7 @@ from config.files import one_line
 from config.robot import RingConfig, RobotConfig
 from drivers import line_diagnostics
 from drivers.denning import diagnostics
+from drivers.denning.boot_numbers import BootNumbers
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Ack, Drive, Echo, Echo2, Echo3, Frame, Hello, Ident, Nak, NakCode, Odom
 from drivers.denning.line_load import refuse_overload
@@ -55,10 +56,10 @@ class DenningDriver(Session[PoseStamper]):
         self._newest = self._version = version  # what to ask for first, and what to ask for now
         self._unit_m = 0.0  # of a count in ECHO2
         self._ident: Ident | None = None
-        self._earlier_boot: int | None = None  # boot number of the robot that answered before the present one
+        self._boot_numbers = BootNumbers()
         self._jump: Jump | None = None  # of the clock, for which the robot is being identified
         self._decoder = Decoder("robot", midway=True)
-        self._odometry_s = self._last_frame_s = self._restarted_s = 0.0  # when the last one came
+        self._odometry_s = self._last_frame_s = 0.0  # when the last one came
         self._bad_at_odometry = 0  # corrupt frames of this line before it
         self._seq = 0
         self._flush_first = False  # whether the next write is the first on this line
@@ -86,7 +87,7 @@ class DenningDriver(Session[PoseStamper]):
         super().line_opened(run_s)
         self._last_frame_s = run_s
         self._flush_first = True
-        self._earlier_boot = None
+        self._boot_numbers = BootNumbers()
         self._drive_acks = CommandAckMonitor()
         self._start_handshake()
 
@@ -301,12 +302,9 @@ class DenningDriver(Session[PoseStamper]):
             return
         self._ident = ident
         known, self._identity = self._identity, identity_of(ident)
-        if known is not None and known.boot_id != ident.boot_id:
-            earlier, self._earlier_boot = self._earlier_boot, known.boot_id
-            since_s, self._restarted_s = self._run_s - self._restarted_s, self._run_s
-            if diagnostics.comes_back(ident.boot_id, earlier, since_s):
-                self._go_down(diagnostics.two_robots(ident))
-                return
+        if known is not None and self._boot_numbers.are_of_two(known.boot_id, ident.boot_id, self._run_s):
+            self._go_down(diagnostics.two_robots(ident))
+            return
         self._version, self._unit_m = ident.version, 1e-6 * ident.range_unit_um
         is_known = known is not None and known.traits == self._identity.traits
         if not is_known and (coarse := diagnostics.coarse_ranges(ident, self._config.ring.resolution_m)) is not None:

@@ -34,8 +34,9 @@ class PendingCommand:
     """True if it should be sent as soon as possible."""
     tries: int = 0
     sent_s: float = 0.0
+    """When the newest try was sent."""
     first_s: float = 0.0
-    """Number of tries, and the times of the newest and of the first."""
+    """When the first was."""
     seqs: deque[int] = field(default_factory=lambda: deque(maxlen=_SEQS_KEPT))
 
     def frame(self, seq: int, run_s: float) -> HostFrame:

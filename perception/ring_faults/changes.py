@@ -53,6 +53,8 @@ class Expected(Record):
     """The share of an honest sensor's readings that are not as expected."""
     honest_nat: Annotated[float, FINITE]
     """The logarithm of the density of what an honest sensor reads."""
+    honest: Annotated[float, FINITE]
+    """That density where misses are near by, too; see `density_if_turned`."""
 
 
 @kernel
@@ -222,10 +224,10 @@ def density_if_turned(
     if r < 0.0 or (high >= 0.0 and low <= r <= high):
         return likely
     near = 0.0
-    for k in range(len(echoes)):
-        if echoes[k].is_compared:
-            off = abs(wrapped(echoes[k].before.axis - echoes[i].latest.axis - turn))
-            low, high = expect(k, i, turn, half_angle, tolerance, mounts, echoes)
+    for other in range(len(echoes)):
+        if echoes[other].is_compared:
+            off = abs(wrapped(echoes[other].before.axis - echoes[i].latest.axis - turn))
+            low, high = expect(other, i, turn, half_angle, tolerance, mounts, echoes)
             if off < 2.0 * half_angle and high >= 0.0 and 2.0 * low - high <= r <= 2.0 * high - low:
                 near = max(near, 1.0 / (3.0 * (high - low)))
     return 0.5 * likely * (1.0 + near * reach)
@@ -256,9 +258,8 @@ def weigh_exchange(
     for i in range(len(echoes)):
         if expected[i].source < 0:
             continue
-        missed = expected[i].missed
-        honest = density_if_turned(i, 0.0, missed, half_angle, tolerance, reach, mounts, echoes)
-        likely = density_if_turned(i, turn, missed, half_angle, tolerance, reach, mounts, echoes)
+        honest = expected[i].honest
+        likely = density_if_turned(i, turn, expected[i].missed, half_angle, tolerance, reach, mounts, echoes)
         if likely < 0.0:
             likely = min(honest, 0.5 if echoes[i].latest.range_m < 0.0 else 0.5 / reach)
         evidence += math.log(likely / honest)
@@ -321,7 +322,10 @@ def weigh_changes(
     if not compare(half_angle, tolerance, reach, missed, mounts, echoes, expected):
         return found, most
     for k in range(len(echoes)):
-        if expected[k].source >= 0 and expected[k].is_off:
+        one = expected[k]
+        if one.source >= 0:
+            one.honest = density_if_turned(k, 0.0, one.missed, half_angle, tolerance, reach, mounts, echoes)
+        if one.source >= 0 and one.is_off:
             nats = weigh_length(k, reach, echoes, expected)
             if nats > most:
                 found, most = LENGTHENED, nats

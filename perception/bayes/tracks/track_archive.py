@@ -103,7 +103,8 @@ class TrackArchive:
         x, y = float(memory.state["ring_x"][0]), float(memory.state["ring_y"][0])
         if self._is_due or not math.hypot(x - self._looked_x, y - self._looked_y) <= LOOK_M:
             self._looked_x, self._looked_y = x, y
-            kinds = self._kinds(memory, p, sure)
+            # Before the first object none is looked for: to read all tracks takes a tenth of a millisecond.
+            kinds = self._kinds(memory, p, sure) if numbered else ()
             exchanged = [kind.exchange(x, y, float(p[0].range_max_m)) for kind in kinds]
             self._is_due = any(exchanged)
             if not self._is_due:

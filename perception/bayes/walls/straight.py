@@ -129,6 +129,8 @@ def straighten(walls: dict[int, Straight], corners: Structured, edges: Structure
     tuple of (n,) record of `RoomCorner`
         The corners and the edges, with their corrected places.
     """
+    if not walls:
+        return corners, edges
     points = np.concatenate([corners, edges])
     ends = points[len(corners) :]["second"].copy()
     points["second"][len(corners) :] = -1

@@ -13,6 +13,7 @@ import itertools
 import json
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -164,18 +165,19 @@ def run_evidence(
     grid = EvidenceGrid(ring, GridConfig().model_copy(update={"method": chosen, "cells": cells, "cell_m": CELL_M}))
     grid.window.fix(*(0.5 * (low + high)).tolist())
     half_angle = math.radians(ring.beam_half_angle_deg)
-    entered = list[tuple[Firing, Floats, int]]()
+    entered, explained, end = list[tuple[Firing, Floats, int]](), explained_bearings(world, echoes, half_angle), 0
     for scan in scans_of(echoes, ring):
         sensors, ranges = scan.rows["sensor"], np.full(len(ring.mounts), np.nan)
         ranges[sensors] = scan.rows["range_m"]
+        begin, end = end, end + len(scan.rows)
         grid.bearings[:] = np.nan
-        grid.bearings[sensors] = explained_bearings(world, scan.rows, half_angle)
+        grid.bearings[sensors] = explained[begin:end]
         on_wheels = [row for row in scan.rows if row["sensor"] in ring.turning]
         theta = float(on_wheels[0]["bearing"]) - ring.mounts[on_wheels[0]["sensor"]][2] if on_wheels else scan.yaw
         firing = Firing(scan.t_s, Pose(scan.x, scan.y, theta), scan.yaw, ranges)
         grid.observe(firing)
         entered.append((firing, grid.bearings.copy(), grid.place))
-    grid.know_slanting(slanting_answers(world, echoes, ring))
+    grid.know_slanting(slanting_answers(world, echoes[np.isnan(explained)], ring))
     x_m, y_m = (CELL_M * float(number) for number in grid.window.corner)
     occupied = grid.method.probability(None)
     holds = occupied > EVEN
@@ -195,13 +197,7 @@ def explained_bearings(world: WorldConfig, rows: Echoes, half_angle: float) -> F
     """
     at = np.column_stack([rows["x"], rows["y"]])
     best, found = np.full(len(rows), EXPLAINED_M), np.full(len(rows), np.nan)
-    contacts = [((drum.x_m, drum.y_m) - at, drum.radius_m) for drum in world.drum]
-    for x1, y1, x2, y2 in itertools.chain.from_iterable(wall.pieces_m() for wall in world.wall):
-        start, chord = np.array([x1, y1]), np.array([x2 - x1, y2 - y1])
-        along = (at - start) @ chord / max(1e-12, float(chord @ chord))
-        feet = start + np.outer(np.where((along >= 0.0) & (along <= 1.0), along, np.nan), chord)
-        contacts.append((feet - at, 0.0))
-    for towards, radius_m in contacts:
+    for towards, radius_m in _contacts(world, at):
         off = _turned(np.arctan2(towards[:, 1], towards[:, 0]) - rows["bearing"])
         with np.errstate(invalid="ignore"):
             error = np.abs(rows["range_m"] - np.hypot(towards[:, 0], towards[:, 1]) + radius_m)
@@ -210,11 +206,20 @@ def explained_bearings(world: WorldConfig, rows: Echoes, half_angle: float) -> F
     return found
 
 
-def slanting_answers(world: WorldConfig, echoes: Echoes, ring: RingConfig) -> int:
-    """Return what a run's readings show of slanting walls, as `perception.method.Method.locate_echoes` has it.
+def _contacts(world: WorldConfig, at: Floats) -> Iterator[tuple[Floats, float]]:
+    """Yield the way from each place to the middle or the foot of each surface, and its radius, m."""
+    yield from (((drum.x_m, drum.y_m) - at, drum.radius_m) for drum in world.drum)
+    for x1, y1, x2, y2 in itertools.chain.from_iterable(wall.pieces_m() for wall in world.wall):
+        start, chord = np.array([x1, y1]), np.array([x2 - x1, y2 - y1])
+        along = (at - start) @ chord / max(1e-12, float(chord @ chord))
+        feet = start + np.outer(np.where((along >= 0.0) & (along <= 1.0), along, np.nan), chord)
+        yield feet - at, 0.0
 
-    A wall whose foot lies outside the beam may answer from the beam's edge. Readings that nothing else explains show
-    whether it does.
+
+def slanting_answers(world: WorldConfig, rows: Echoes, ring: RingConfig) -> int:
+    """Return what readings that nothing explains show of slanting walls, as of `Method.locate_echoes`.
+
+    A wall whose foot lies outside the beam may answer from the beam's edge.
     """
     from perception.bayes.walls.contact import (
         EDGES_LEAD,
@@ -226,7 +231,6 @@ def slanting_answers(world: WorldConfig, echoes: Echoes, ring: RingConfig) -> in
     )
 
     half_angle = math.radians(ring.beam_half_angle_deg)
-    rows = echoes[np.isnan(explained_bearings(world, echoes, half_angle))]
     heard = silent = 0
     for x1, y1, x2, y2 in itertools.chain.from_iterable(wall.pieces_m() for wall in world.wall):
         length = math.hypot(x2 - x1, y2 - y1)

@@ -167,10 +167,11 @@ def _most_frequent(moved: Floats, finite: Floats) -> Silence:
     second = int(np.delete(counts, most).max(initial=1))
     if counts[most] > max(MODE_FACTOR * second, MODE_SHARE * len(finite_moved)):
         value, band = float(values[most]), _unlike_wall(_top(finite_moved), moved)
-        if band is None or not band.low <= value <= band.high:
-            return _one_value(value, finite)
-        inside = np.count_nonzero((finite_moved >= band.low) & (finite_moved <= band.high))
-        return band if inside > (1.0 + NOISY_SHARE) * counts[most] else _one_value(value, finite)
+        if band is not None and band.low <= value <= band.high:
+            inside = np.count_nonzero((finite_moved >= band.low) & (finite_moved <= band.high))
+            if inside > (1.0 + NOISY_SHARE) * counts[most]:
+                return band
+        return _one_value(value, finite)
     found = _unlike_wall(_top(finite_moved), moved) or _spikes(moved)
     wide = None if found else _unlike_wall(_band(finite_moved, GLITCHES, *DOUBTFUL), moved)
     if wide is not None:

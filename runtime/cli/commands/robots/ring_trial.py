@@ -232,16 +232,12 @@ class RingTest:
         """Ask for a hand before each sensor, and write which of them does not answer in its place."""
         ring = self._config.ring
         before, (near_m, far_m) = [statistics.median(each) if each else math.inf for each in ranges], held_m(ring)
-        watch = HandWatch(before, far_m)
-        answered, heard, asked = (
-            list[int | None](),
-            list[frozenset[int]](),
-            f"{100 * near_m:.0f} to {100 * far_m:.0f}",
-        )
+        watch, distance = HandWatch(before, far_m), f"{100 * near_m:.0f} to {100 * far_m:.0f}"
+        answered, heard = list[int | None](), list[frozenset[int]]()
         for sensor, angle_rad in hands_before(ring):
             # A sensor beside one on a servo may hear a hand sooner than the bearing that looks there.
             own = {k for k, of in enumerate(ring.sensor_of) if of == sensor or not ring.has_servo}
-            self._write(f"hold something flat {asked} cm from the sensor, {side_of(angle_rad)} …\n")
+            self._write(f"hold something flat {distance} cm from the sensor, {side_of(angle_rad)} …\n")
             sys.stdout.flush()
             watch.ask()
             found, answering, deadline_s = None, frozenset[int](), self._clock() + HAND_S

@@ -124,7 +124,7 @@ async def test_what_was_typed_before_it_took_the_terminal_is_dropped(keyboard: i
     """An a that was meant for the shell arms no robot."""
     asked: list[Request] = []
     os.write(keyboard, b"aq")
-    await asyncio.sleep(0.05)
+    assert os.read(keyboard, 2) == b"aq"  # its echo: now the terminal has it
     with keys(asked.append, lambda: pytest.fail("it was typed before")):
         await asyncio.sleep(0.05)
         os.write(keyboard, b" ")
