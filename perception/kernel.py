@@ -15,7 +15,7 @@ from typing import Final, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.kernel_compiler import KernelDispatcher
+from perception.kernel_compiler import EntryDispatcher, KernelDispatcher
 from perception.records import INTERPRETED
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -41,6 +41,14 @@ def kernel(function: F) -> F:
     error when it is compiled.
     """
     return _compiled(function, **BORROWING)
+
+
+def entry_kernel(function: F) -> F:
+    """Compile `function` as `kernel` does, for one that Python calls with each firing.
+
+    Only its first call looks at what types its arguments have; the type checker sees to it that they stay the same.
+    """
+    return function if INTERPRETED else cast("F", EntryDispatcher(function, **BORROWING))
 
 
 def loop_kernel(function: F) -> F:

@@ -21,7 +21,7 @@ import numpy as np
 from drivers.messages import Firing, Pose
 from perception.angles import wrapped
 from perception.bounds import CONSTANT, Bound, Flag, Place, bounds
-from perception.kernel import Floats, kernel
+from perception.kernel import Floats, entry_kernel, kernel
 from perception.records import Record, Records, records, zeros
 from perception.sensor_mounts import mounts_at, sensor_pose
 from perception.shared_numbers import ROUNDING
@@ -116,7 +116,7 @@ def forget_ahead(x: float, y: float, heading: float, walls: Records[BlindWall]) 
                 least = AGAIN_SHARE * KEPT_M
 
 
-@kernel
+@entry_kernel
 def enter_looks(
     ranges: Floats,
     mounts: Floats,

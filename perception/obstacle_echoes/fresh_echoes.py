@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from drivers.messages import Firing, Pose
 from perception.angles import SAME_RAD, wrapped
 from perception.bounds import CONSTANT, PLACE, bounds
-from perception.kernel import Floats, kernel
+from perception.kernel import Floats, entry_kernel, kernel
 from perception.obstacle_echoes.blind_walls import BlindWalls
 from perception.obstacle_echoes.unheard_echoes import (
     ALONE,
@@ -122,7 +122,7 @@ def forget_look(bearing: float, same: float, bearings: Floats, times: Floats, he
     return second if in_direction >= SAME_MAX else oldest
 
 
-@kernel
+@entry_kernel
 def record_echoes(
     ranges: Floats,
     mounts: Floats,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from drivers.messages import Pose
 from perception.bounds import CONSTANT, Flag, Place, bounds, index_of
-from perception.kernel import Floats, Ints, kernel
+from perception.kernel import Floats, Ints, entry_kernel, kernel
 from perception.records import Record, Records, records, zeros
 from perception.sensor_mounts import RingPose, SensorPose, sensor_pose
 
@@ -120,7 +120,7 @@ def contradict_remembered(
             one.is_kept = 0
 
 
-@kernel
+@entry_kernel
 def remember(
     ranges: Floats,
     mounts: Floats,

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from drivers.messages import Pose
 from perception.bounds import COUNT, PLACE, Flag, Place, bounds, index_of
-from perception.kernel import Floats, Ints, kernel
+from perception.kernel import Floats, Ints, entry_kernel, kernel
 from perception.obstacle_echoes.blind_walls import TURN_DIRECTIONS, WIDTH_RAD, BlindWalls, middle_walls
 from perception.obstacle_echoes.remembered_echoes import HAS_MOVED_M, RememberedEchoes
 from perception.records import Record, Records, records, zeros
@@ -112,7 +112,7 @@ def reaches(r: float, sensor: SensorPose, core: float, one: UnheardEcho) -> bool
     return bool(0.0 < ahead < r + SAME_ECHO_M and across < ahead * math.tan(core))
 
 
-@kernel
+@entry_kernel
 def contradict_echoes(
     ranges: Floats,
     mounts: Floats,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.kernel import Floats, kernel
+from perception.kernel import Floats, entry_kernel, kernel
 from perception.records import Records
 from perception.ring_faults.changes import (
     EXCHANGED,
@@ -229,7 +229,7 @@ def forget_echoes(echoes: Records[EchoTrace]) -> None:
         echoes[i].heard.range_m = echoes[i].agreed_m = NO_ECHO_M
 
 
-@kernel
+@entry_kernel
 def check_motion(
     ranges: Floats,
     pose: RingPose,

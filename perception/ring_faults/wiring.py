@@ -12,7 +12,7 @@ import math
 from typing import Final, NamedTuple
 
 from config.robot import BY_HAND_MAX
-from perception.kernel import Floats, Ints, kernel
+from perception.kernel import Floats, Ints, entry_kernel, kernel
 from perception.ring_faults.memory import NO_ECHO_M, Reception
 from perception.sensor_faults.wall import NOISE_SHARE
 from perception.sensor_mounts import RingPose
@@ -208,7 +208,7 @@ def weigh_turn(mounts: Floats, reception: Reception, wiring: Wiring, near: Float
                 nats[i, n] += math.log(deaf / density(beyond(judged[3], own), mounted, reach))
 
 
-@kernel
+@entry_kernel
 def weigh_wiring(
     ranges: Floats, pose: RingPose, mounts: Floats, reception: Reception, wiring: Wiring, near: Floats, most: float
 ) -> int:

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.kernel import Floats, Ints, kernel
+from perception.kernel import Floats, Ints, entry_kernel, kernel
 from perception.records import Records
 from perception.sensor_faults.crosstalk import count_short_readings, find_set, is_doubtful
 from perception.sensor_faults.memory import TOO_NEAR_READINGS, RingMemory, RingSetup, SensorMemory
@@ -294,7 +294,7 @@ def lost_trust(c: SensorMemory, r: float, fired_set: int, least: float) -> int:
     return LESS_TRUSTED if r < least or (c.faults & SILENT and not math.isfinite(r)) else 0
 
 
-@kernel
+@entry_kernel
 def check_firing(
     ranges: Floats,
     pose: RingPose,

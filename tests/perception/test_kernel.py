@@ -8,7 +8,10 @@ import numba
 import numpy as np
 import pytest
 
-from perception.kernel import Floats, kernel, owning_kernel
+from config.load import load_settings
+from perception.kernel import Floats, entry_kernel, kernel, owning_kernel
+from perception.kernel_compiler import EntryDispatcher, KernelDispatcher
+from runtime.simulation.closed_loop import simulate
 
 
 @kernel
@@ -54,3 +57,30 @@ def test_a_kernel_that_allocates_does_not_compile() -> None:
 
     with pytest.raises(numba.NumbaError, match="Only accept returning of array"):
         allocating(3)
+
+
+@pytest.mark.compiled
+def test_an_entry_kernel_meets_the_same_types_in_each_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After its first call it looks at them no more: of rings that turn in part, listen across or are a servo."""
+    met: dict[str, set[tuple[object, ...]]] = {}
+
+    def look(self: EntryDispatcher, *args: object) -> object:
+        met.setdefault(self.__name__, set()).add(tuple(map(self.typeof_pyval, args)))
+        return KernelDispatcher.__call__(self, *args)
+
+    monkeypatch.setattr(EntryDispatcher, "__call__", look)
+    for robot in ("denning", "b21r-both", "ears", "servo1"):
+        settings = load_settings("room", robot=robot)
+        assert settings.world is not None
+        simulate(settings, settings.world, 0, 4.0)
+    assert {"check_firing", "check_motion", "record_echoes", "quantum", "fit_walls"} <= set(met)
+    assert {name: types for name, types in met.items() if len(types) > 1} == {}
+
+
+@pytest.mark.compiled
+def test_an_entry_kernel_takes_other_values_and_numbers() -> None:
+    @entry_kernel
+    def scaled(values: Floats, by: float) -> float:
+        return float(values[0]) * by
+
+    assert [scaled(np.full(2, value), by) for value, by in ((1.0, 2.0), (3.0, 0.5), (2.0, 3))] == [2.0, 1.5, 6.0]

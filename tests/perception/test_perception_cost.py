@@ -25,13 +25,13 @@ pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 SETTINGS = load_settings("hallway")
 MANY_QUANTA = load_settings("hallway", ["perception.method=paper"])
 """The paper's method refines every candidate whose cluster changed, so that a budget can interrupt it."""
-RATIO_MAX = 1.5
-"""Limit of a reading beside the control. Measured is 0.8, beside other programs 1.1; interpreted, it takes ten times
-the control."""
+RATIO_MAX = 2.4
+"""Limit of a reading beside the control, twice what is measured beside other programs, 1.2; alone it is 1.0, and
+interpreted ten times the control."""
 DRIVES_MAX = 5
 """Drives of which one must keep to the limit."""
 WORST_RATIO_MAX = 10.0
-"""Limit of each single reading. Measured is 2."""
+"""Limit of each single reading. Measured is 5."""
 
 
 @pytest.fixture(scope="module")

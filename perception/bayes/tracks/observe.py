@@ -30,7 +30,7 @@ from perception.bayes.segments.pairing import make_segments
 from perception.bayes.tracks.model_check import count_surroundings
 from perception.bayes.tracks.track_selection import is_waiting
 from perception.bayes.walls.pose_jitter import place_by_others
-from perception.kernel import Floats, Ints, kernel
+from perception.kernel import Floats, Ints, entry_kernel, kernel
 from perception.records import Records
 from perception.sensor_mounts import RingPose
 from perception.shared_numbers import CERTAIN_PROBABILITY, FAR
@@ -265,7 +265,7 @@ def propose(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, made: int) 
             return
 
 
-@kernel
+@entry_kernel
 def associate(
     s: StateRecord,
     tracks: CircleTracks,
@@ -363,7 +363,7 @@ def hear_crosses(
     associate_circles(s, tracks, p, end, m)
 
 
-@kernel
+@entry_kernel
 def observe(
     s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int, time_s: float, threshold: float
 ) -> tuple[int, bool]:

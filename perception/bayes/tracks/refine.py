@@ -63,7 +63,7 @@ from perception.bayes.memory.state import (
 from perception.bayes.tracks.model_check import check_model, count_names, is_careful
 from perception.bayes.tracks.naming import update_name, withdraw_overlapping
 from perception.bayes.tracks.track_selection import choose_circle, is_waiting
-from perception.kernel import kernel
+from perception.kernel import entry_kernel, kernel
 from perception.shared_numbers import CERTAIN_PROBABILITY
 
 
@@ -342,7 +342,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     merge_duplicates(tracks, p, t)
 
 
-@kernel
+@entry_kernel
 def quantum(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, threshold: float) -> bool:
     """Refine the circle that is next; return whether another circle waits.
 

@@ -14,7 +14,7 @@ from perception.bayes.walls.bins import HALF, clear_wall, is_covered, mean_error
 from perception.bayes.walls.contact import are_mirrors, edges_answer
 from perception.bayes.walls.evidence import judge
 from perception.bayes.walls.numbers import number_spans
-from perception.kernel import kernel
+from perception.kernel import entry_kernel, kernel
 from perception.shared_numbers import OUTLIER_SIGMAS
 
 SLOPE_SIGMA: Final = 0.15
@@ -233,7 +233,7 @@ def find_spans(room: WallMap, wall: Wall) -> None:
         passes = 0.0
 
 
-@kernel
+@entry_kernel
 def fit_walls(s: StateRecord, p: SettingsRecord, first: int, end: int, step: int) -> None:
     """Find the spans of the walls whose bins have changed, fit, judge and number them; end those that fade away.
 

@@ -21,7 +21,7 @@ from perception.bayes.memory.wall_records import CORNERS_MAX, EDGES_MAX, WALL_BI
 from perception.bayes.walls.bins import HALF
 from perception.bayes.walls.corners import SAME_CORNER_M
 from perception.bayes.walls.report import sure_room
-from perception.kernel import kernel
+from perception.kernel import entry_kernel
 from perception.sensor_mounts import RingPose
 
 STANDING_RAD: Final = math.acos(STILL_COS)
@@ -46,7 +46,7 @@ def keep_while_standing(memory: Memory, pose: RingPose) -> None:
         mark_sure(memory)
 
 
-@kernel
+@entry_kernel
 def has_just_stopped(s: StateRecord, pose: RingPose) -> bool:
     """Return whether the robot has stopped since the last firing; when it moves on, remove the marks.
 

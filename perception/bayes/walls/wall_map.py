@@ -61,7 +61,7 @@ from perception.bayes.walls.merging import drop_explained, merge_walls
 from perception.bayes.walls.noise import add_residual, estimate_noise
 from perception.bayes.walls.points import LONGER_SIGMAS, find_heard_points
 from perception.bayes.walls.review import RECENT_SPACING_M, remember, review
-from perception.kernel import kernel
+from perception.kernel import entry_kernel, kernel
 from perception.shared_numbers import FAR
 
 KNOWN_SPACING_M: Final = 0.24
@@ -225,7 +225,7 @@ def explain(room: WallMap, q: Reading, p: SettingsRecord, is_known: bool) -> tup
     return -1, kind, True
 
 
-@kernel
+@entry_kernel
 def enter_firing(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int) -> int:
     """Enter a firing's readings; return the place of a recent echo that nothing explains, or −1.
 
