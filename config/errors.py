@@ -15,6 +15,8 @@ FAILED: Final = 1
 """The work failed."""
 WRONG_CALL: Final = 2
 """The call or the configuration was wrong."""
+NOT_SHOWN: Final = 3
+"""No fault was found, but a test could not show that all is good."""
 
 
 class UserError(Exception):

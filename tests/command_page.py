@@ -15,7 +15,7 @@ Every command with its arguments and options, made from the program by `python -
 many commands have: `--set section.key=value` overrides a setting, `--json FILE` writes a summary, `--headless`
 disables the live view. A command never writes into a file that it reads, also not through a link; it overwrites a
 file that exists only with `--force`. Exit codes: 0 done, 1 the work failed, 2 the call or the configuration wrong,
-128 + n ended by signal n before the run began.
+3 no fault found, but not all could be shown to be good (`ring-test`), 128 + n ended by signal n before the run began.
 """
 """The first lines of the page, in place of the program's own."""
 

@@ -102,7 +102,8 @@ app = App(
     name="echolocate",
     help="A robot's main process that recognises and locates objects by sonar alone.",
     help_epilogue=(
-        "Exit status: 0 done, 1 the work failed, 2 the call or the configuration wrong, 128 + n ended by signal n."
+        "Exit status: 0 done, 1 the work failed, 2 the call or the configuration wrong, 3 no fault found, but not "
+        "all could be shown to be good (ring-test), 128 + n ended by signal n."
     ),
     version=version,
     group_parameters=Group("Options"),

@@ -20,7 +20,9 @@ def ring_test(
 ) -> int:
     """Fire each sensor of a robot by itself and report what it hears; with `--move`, try its motors.
 
-    Sensors that hear each other are found by firing them as the robot file says, too.
+    Sensors that hear each other are found by firing them as the robot file says, too. Exit status: 0 no fault
+    found, 1 a fault, 3 no fault, but a sensor is not shown to hear: it heard nothing, or always the same; try again
+    with `--hand`.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from typing import Final
 
 from serial.tools.list_ports import comports
 
-from config.errors import DONE, FAILED, WRONG_CALL, UserError
+from config.errors import DONE, FAILED, NOT_SHOWN, WRONG_CALL, UserError
 from config.robot import SOUND_SPEED_M_S, FiringConfig, RingConfig, RobotConfig
 from drivers.base_model import stop_s
 from drivers.driver import LineState
@@ -140,7 +140,9 @@ class RingTest:
         self._odometry: Odometry | None = None
 
     async def run(self, rounds: int, *, move: bool, hand: bool = False) -> int:
-        """Test the sensors, and what else is asked for; return the exit code, `DONE` if all is good. Once.
+        """Test the sensors, and what else is asked for; return the exit code. Once.
+
+        It is `FAILED` if a fault was found, `NOT_SHOWN` if none was but a sensor may be deaf, else `DONE`.
 
         Parameters
         ----------
@@ -167,8 +169,8 @@ class RingTest:
             is_good, unshown = self._judge(ranges, rounds, together)
             if hand:
                 is_good = await self._test_places(ranges) and is_good
+                unshown = []
             else:
-                is_good &= not unshown
                 one = len(unshown) == 1
                 which = f"sensor{'s' * (not one)} {', '.join(map(str, unshown))} hear{'s' * one}"
                 hears = f"whether {which}, and " if unshown else ""
@@ -178,7 +180,7 @@ class RingTest:
         finally:
             await self._connection.shut_down()
             await self._link.stop()
-        return DONE if is_good else FAILED
+        return (NOT_SHOWN if unshown else DONE) if is_good else FAILED
 
     async def _listen(self, ring: RingConfig, rounds: int) -> list[list[float]]:
         """Return what each sensor reports in so many firings: m, +inf no echo."""
