@@ -69,8 +69,8 @@ class Teleoperator:
 @pytest.mark.parametrize("how", ["the page falls silent", "the tab is closed", "the network is gone"])
 def test_teleoperation_that_ends(how: str, tmp_path: Path, measured: Callable[[str], None]) -> None:
     """By the emulator's truth: the last velocity's validity, one cycle, and the way that it needs to stop."""
-    with emulated(tmp_path) as robot, running(
-        tmp_path, "run", "run", "--port", robot.port, "--no-record", *FREE_PORT
+    with emulated(tmp_path, fresh=True) as robot, running(
+        tmp_path, "run", "run", "--port", robot.port, "--no-record", *FREE_PORT, fresh=True
     ) as run:  # fmt: skip
         truth, page = Truth(robot.trace), RawPage(start_url(run))
         run.comes_to("READY")

@@ -23,7 +23,10 @@ WATCHED_S = 2.0
 @stalls_excused
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_the_base_stops_by_itself(tmp_path: Path, number: signal.Signals, measured: Callable[[str], None]) -> None:
-    with emulated(tmp_path) as robot, running(tmp_path, "run", "run", "--port", robot.port, "--arm") as run:
+    with (
+        emulated(tmp_path, fresh=True) as robot,
+        running(tmp_path, "run", "run", "--port", robot.port, "--arm", fresh=True) as run,
+    ):
         wait_for(lambda: is_driving(robot.trace), "driving")
         sent = run.signal(number)
         wait_for(lambda: reaches(robot.trace, sent.after_s + WATCHED_S), "the end of the trace")

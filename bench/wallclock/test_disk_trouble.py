@@ -87,7 +87,7 @@ def test_a_disk_that_fills_up_on_the_way(tmp_path: Path, measured: Callable[[str
     (tmp_path / "runs").mkdir()
     where = ("--set", f"recording.folder={json.dumps(str(tmp_path / 'runs'))}")
     # The shell counts in blocks of 512 bytes.
-    with run_with(tmp_path, "run", "", *where, limit="ulimit -f 32") as (run, summary):
+    with run_with(tmp_path, "run", "", *where, file_bytes=16384) as (run, summary):
         written, figures = compare(run, summary, tmp_path)
     assert written["recording"]["dropped"] > 0
     assert written["recording"]["last_error"] is not None

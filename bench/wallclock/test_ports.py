@@ -28,7 +28,7 @@ def run_on(folder: Path, port: str, measured: Measured, timeout_s: float = 0.0) 
     """Run on a port, and check that the run ends within `timeout_s` after its start."""
     with BareStarts() as bare:
         begin_host_s = time.monotonic()
-        with running(folder, "run", "run", "--port", port, "--arm", "--seconds", "600") as run:
+        with running(folder, "run", "run", "--port", port, "--arm", "--seconds", "600", fresh=True) as run:
             yield run
             took_s = time.monotonic() - begin_host_s
     # A second for what is neither: taking Python down again, and looking whether it has ended.
@@ -63,7 +63,7 @@ def test_a_robot_that_is_deaf(tmp_path: Path, measured: Measured) -> None:
     """It sends frames and does not answer."""
     (tmp_path / "faults.toml").write_text("[[fault]]\nat_s = 0.0\nduration_s = 600.0\nkind = 'deaf'\n")
     with (
-        emulated(tmp_path, "--faults", str(tmp_path / "faults.toml")) as robot,
+        emulated(tmp_path, "--faults", str(tmp_path / "faults.toml"), fresh=True) as robot,
         run_on(tmp_path, robot.port, measured, CONNECT_MAX_S) as run,
     ):
         check(run, FAILED, "HELLO", "although the robot sends other frames")

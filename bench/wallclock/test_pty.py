@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 @stalls_excused
 def test_its_time_is_real_time(tmp_path: Path, measured: Callable[[str], None]) -> None:
-    with emulated(tmp_path) as robot:
+    with emulated(tmp_path, fresh=True) as robot:
         truth = Truth(robot.trace)
         begin_s = time.monotonic()
         first = truth.wait(lambda row: row.host_s > begin_s, "a row")

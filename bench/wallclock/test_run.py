@@ -53,7 +53,7 @@ def summary_of(path: Path) -> dict[str, Any]:
 @stalls_excused
 def test_six_drums_in_real_time_with_a_control_loop(tmp_path: Path, measured: Callable[[str], None]) -> None:
     path = tmp_path / "summary.json"
-    with running(tmp_path, "run", "run", "--seconds", str(DRIVE_S), "--json", str(path)) as run:
+    with running(tmp_path, "run", "run", "--seconds", str(DRIVE_S), "--json", str(path), fresh=True) as run:
         bare = asyncio.run(bare_loop(run))
         assert run.end() == 0
     assert run.error_lines == []
@@ -88,14 +88,14 @@ def test_six_drums_in_real_time_with_a_control_loop(tmp_path: Path, measured: Ca
 
 
 def drive(folder: Path, robot: Emulated, name: str = "run", *more: str) -> Any:
-    return running(folder, name, "run", "--port", robot.port, *more)
+    return running(folder, name, "run", "--port", robot.port, *more, fresh=True)
 
 
 @stalls_excused
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_halts_the_base_before_the_end(tmp_path: Path, number: signal.Signals) -> None:
     path = tmp_path / "summary.json"
-    with emulated(tmp_path) as robot:
+    with emulated(tmp_path, fresh=True) as robot:
         with drive(tmp_path, robot, "run", "--arm", "--json", str(path)) as run:
             wait_for(lambda: is_driving(robot.trace), "driving")
             with BareStarts() as bare:
@@ -122,7 +122,7 @@ def test_an_interrupt_halts_the_base_before_the_end(tmp_path: Path, number: sign
 def test_from_start_to_first_cycle_takes_as_long_as_a_few_bare_starts(
     tmp_path: Path, measured: Callable[[str], None]
 ) -> None:
-    with emulated(tmp_path) as robot, BareStarts() as bare:
+    with emulated(tmp_path, fresh=True) as robot, BareStarts() as bare:
         begin_host_s = time.monotonic()
         with drive(tmp_path, robot) as run:
             run.comes_to("READY")

@@ -35,7 +35,7 @@ async def take(kept: Path) -> int:
     program = shutil.which("chromium-headless-shell") or shutil.which("chromium")
     width, height = DESKTOP
     arguments = ("run", "--no-record", "--set", "console.port=0")
-    with tempfile.TemporaryDirectory() as name, running(Path(name), "run", *arguments) as command:
+    with tempfile.TemporaryDirectory() as name, running(Path(name), "run", *arguments, fresh=True) as command:
         url = await asyncio.to_thread(start_url, command)
         async with async_playwright() as playwright:
             browser = await playwright.chromium.launch(executable_path=program, args=list(ARGUMENTS))

@@ -1,6 +1,6 @@
-"""The command with a fault of the program or of its disk planted in it: `python -m tests.hil.planted run …`.
+"""The command with a fault of the program or of its disk planted in it.
 
-PLANTED names what is planted, between commas:
+What may be planted:
 
 - ``busy``: SIGURG holds the loop in a callback for ten seconds, SIGWINCH for a little more than the deadman. The
   moment when that begins goes to standard output.
@@ -12,17 +12,17 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import resource
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from runtime.cli.app import main
 from runtime.cycle.process import RobotProcess
-from tests.hil.running import ROOT, Running
+from tests.hil.forked_command import ForkedCommand
+from tests.hil.running import ROOT, Running, ended
 
 LONG_S, SHORT_S = 10.0, 1.2
 FSYNC_S = 5.0
@@ -66,7 +66,7 @@ PLANTS = {"busy": plant_busy, "fsync": plant_fsync}
 @contextlib.contextmanager
 def planted(
     folder: Path, name: str, plants: str, *arguments: str, log: Path | None = None, stderr: int | None = None,
-    env: dict[str, str] | None = None, limit: str = "",
+    env: dict[str, str] | None = None, file_bytes: int | None = None,
 ) -> Iterator[Running]:  # fmt: skip
     """Run the command so; whatever is left of it at the end is killed.
 
@@ -82,28 +82,23 @@ def planted(
         Its standard error, where that is not FOLDER/NAME.err.
     env
         Added to the environment.
-    limit
-        A command of the shell before all else, as ``ulimit -f 64``.
+    file_bytes
+        Where its files end.
     """
     log = folder / f"{name}.jsonl" if log is None else log
-    command = [sys.executable, "-m", "tests.hil.planted", *arguments, "--headless", "--set", f'log.file="{log}"']
-    if limit:
-        # A limit on files would cut off compiled modules, and every later start would fail on them.
-        command = ["/bin/sh", "-c", f'{limit}; PYTHONDONTWRITEBYTECODE=1 exec "$@"', "sh", *command]
-    with (folder / f"{name}.out").open("wb") as out, (folder / f"{name}.err").open("wb") as err:
-        process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=out, stderr=err if stderr is None else stderr,
-            env={**os.environ, "PYTHONPATH": str(ROOT), "PLANTED": plants, **(env or {})},
-        )  # fmt: skip
-        try:
-            yield Running(process, folder, name)
-        finally:
-            process.send_signal(signal.SIGCONT)
-            process.kill()
-            process.wait()
+    command = [*arguments, "--headless", "--set", f'log.file="{log}"']
 
+    def prepare() -> None:
+        for plant in filter(None, plants.split(",")):
+            PLANTS[plant]()
+        if file_bytes is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes))
 
-if __name__ == "__main__":
-    for plant in filter(None, os.environ.get("PLANTED", "").split(",")):
-        PLANTS[plant]()
-    main()
+    with (
+        Path(os.devnull).open("rb") as nothing,
+        (folder / f"{name}.out").open("wb") as out,
+        (folder / f"{name}.err").open("wb") as err,
+    ):
+        streams = (nothing.fileno(), out.fileno(), err.fileno() if stderr is None else stderr)
+        environment = {"PYTHONPATH": str(ROOT), **(env or {})}
+        yield from ended(Running(ForkedCommand(command, streams, environment, prepare), folder, name))

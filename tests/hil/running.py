@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from drivers.messages import Flags
+from tests.hil.forked_command import ForkedCommand
 from tests.hil.machine import LOOK_S, TIMEOUT_S
 from tests.hil.truth import Truth
 
@@ -49,7 +50,7 @@ class Signalled(NamedTuple):
 class Running:
     """A command under way."""
 
-    process: subprocess.Popen[bytes]
+    process: subprocess.Popen[bytes] | ForkedCommand
     folder: Path
     name: str
     _log: list[dict[str, object]] = field(default_factory=list)
@@ -118,20 +119,47 @@ class Running:
 
 
 @contextlib.contextmanager
-def running(folder: Path, name: str, *arguments: str) -> Iterator[Running]:
-    """Run `echolocate` with `arguments`; whatever is left of it at the end is killed."""
-    command = [sys.executable, "-m", "runtime.cli", *arguments]
+def running(folder: Path, name: str, *arguments: str, fresh: bool = False) -> Iterator[Running]:
+    """Run `echolocate` with `arguments`; whatever is left of it at the end is killed.
+
+    Parameters
+    ----------
+    folder, name
+        Of the files with what it writes.
+    arguments
+        Of the command.
+    fresh
+        In a new interpreter, where its start counts.
+    """
+    command = [*arguments]
     if arguments[0] == "run":
         command += ["--headless", "--set", f"log.file={json.dumps(str(folder / f'{name}.jsonl'))}"]
-    with (folder / f"{name}.out").open("wb") as out, (folder / f"{name}.err").open("wb") as err:
-        env = {**os.environ, "PYTHONPATH": str(ROOT)}
-        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=err, env=env)
-        try:
-            yield Running(process, folder, name)
-        finally:
-            process.send_signal(signal.SIGCONT)
-            process.kill()
-            process.wait()
+    env = {"PYTHONPATH": str(ROOT)}
+    with contextlib.ExitStack() as files:
+        nothing = files.enter_context(Path(os.devnull).open("rb"))
+        out, err = (files.enter_context((folder / f"{name}.{kind}").open("wb")) for kind in ("out", "err"))
+        if fresh:
+            program = [sys.executable, "-m", "runtime.cli", *command]
+            yield from ended(
+                Running(
+                    subprocess.Popen(program, stdin=nothing, stdout=out, stderr=err, env=os.environ | env),
+                    folder,
+                    name,
+                )
+            )
+        else:
+            streams = (nothing.fileno(), out.fileno(), err.fileno())
+            yield from ended(Running(ForkedCommand(command, streams, env), folder, name))
+
+
+def ended(run: Running) -> Iterator[Running]:
+    """Yield a command under way, and kill what is left of it at the end."""
+    try:
+        yield run
+    finally:
+        run.process.send_signal(signal.SIGCONT)
+        run.process.kill()
+        run.process.wait()
 
 
 @dataclass(frozen=True)
@@ -143,11 +171,11 @@ class Emulated:
 
 
 @contextlib.contextmanager
-def emulated(folder: Path, *arguments: str) -> Iterator[Emulated]:
-    """Run the emulator by itself."""
+def emulated(folder: Path, *arguments: str, fresh: bool = False) -> Iterator[Emulated]:
+    """Run the emulator by itself; see `running`."""
     robot = Emulated(str(folder / "robot"), folder / "trace.csv")
     command = ["emulate", "--link", robot.port, "--trace", str(robot.trace), "--force", *arguments]
-    with running(folder, "emulate", *command) as emulator:
+    with running(folder, "emulate", *command, fresh=fresh) as emulator:
         wait_for(lambda: emulator.out.startswith("ready") or emulator.process.poll() is not None, "ready")
         assert emulator.process.poll() is None, emulator.err
         yield robot

@@ -24,9 +24,7 @@ from tests.hil.truth import Truth
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels"), pytest.mark.promise("P12")]
 
-BLOCK_BYTES = 512
-"""The shell's `ulimit -f` counts in these."""
-BLOCKS = 128
+FILE_BYTES = 65536
 
 
 def filled_pipe(into: int) -> int:
@@ -59,11 +57,10 @@ def test_a_disk_that_fills_up_and_a_log_and_a_terminal_that_take_nothing(
             emulated(tmp_path) as robot,
             planted(
                 tmp_path, "run", "", *command, "--port", robot.port, log=fifo, stderr=into,
-                limit=f"ulimit -f {BLOCKS}",
+                file_bytes=FILE_BYTES,
             ) as run,
         ):  # fmt: skip
-            full = BLOCKS * BLOCK_BYTES
-            wait_for(lambda: any(path.stat().st_size >= full for path in runs.iterdir()), "a full disk")
+            wait_for(lambda: any(path.stat().st_size >= FILE_BYTES for path in runs.iterdir()), "a full disk")
             truth = Truth(robot.trace)
             assert all(row.still for row in truth.read()), "it was not armed"
             run.signal(signal.SIGTERM)

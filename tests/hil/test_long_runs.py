@@ -52,8 +52,8 @@ def on_the_pty(folder: Path, seconds: float, wrap_s: float) -> dict[str, Any]:
     path = folder / "summary.json"
     command = ["run", "hallway", "--arm", "--seconds", str(seconds), "--json", str(path), "--no-record"]
     with (
-        emulated(folder, "--clock", str(WRAP_S - wrap_s)) as robot,
-        running(folder, "run", *command, "--port", robot.port) as run,
+        emulated(folder, "--clock", str(WRAP_S - wrap_s), fresh=True) as robot,
+        running(folder, "run", *command, "--port", robot.port, fresh=True) as run,
     ):
         assert run.process.wait(seconds + 60.0) == 0, run.err
         assert run.error_lines == []

@@ -119,10 +119,10 @@ def test_a_run_from_its_start_url_to_its_end(tmp_path: Path) -> None:
     recording, more, summary = tmp_path / "run.mcap", tmp_path / "more.toml", tmp_path / "summary.json"
     more.write_text(SETTINGS.format(6.1), "utf-8")
     with (
-        emulated(tmp_path) as robot,
+        emulated(tmp_path, fresh=True) as robot,
         running(
             tmp_path, "run", "run", str(more), "--port", robot.port, "--record", str(recording), "--json",
-            str(summary), "--set", "console.port=0", *PATIENT,
+            str(summary), "--set", "console.port=0", *PATIENT, fresh=True,
         ) as run,
     ):  # fmt: skip
         truth, url = Truth(robot.trace), start_url(run)
