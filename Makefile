@@ -18,7 +18,7 @@ NPM_BIN := $(VENV)/npm/node_modules/.bin
 MYPY = $(BIN)/python -c "import gc; gc.set_threshold(4_000_000, 30, 30); gc.set_threshold = lambda *_: None; \
 	from mypy.__main__ import console_entry; console_entry()"
 KERNELS = tests/perception tests/behaviors/valley tests/drivers/emulator
-BOUNDSCHECKED = $(sort $(shell grep -rl --include='test_*.py' mark.boundscheck tests))
+BOUNDSCHECKED = $(sort $(shell grep -rl --include='test_*.py' 'mark\.bounds' tests))
 
 # Python's compiled modules are kept whatever the environment says: a start without them takes twice the processor time.
 unexport PYTHONDONTWRITEBYTECODE
@@ -89,7 +89,7 @@ promises: $(VENV)/test.stamp $(VENV)/npm.stamp $(VENV)/browser.stamp
 # time that checks memory growth, late compilation and full garbage collections.
 soak: $(VENV)/soak.stamp $(VENV)/browser.stamp ros2
 	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=explore
-	NUMBA_BOUNDSCHECK=1 $(PYTEST) $(BOUNDSCHECKED) -m "boundscheck and soak"
+	NUMBA_BOUNDSCHECK=1 $(PYTEST) $(BOUNDSCHECKED) -m "boundslong or boundscheck and soak"
 	$(BIN)/python -m pytest -m "soak and not ros2" --promises=docs/promises-soak.md
 	@$(BIN)/python -m bench.growth $(SOAK)
 	@$(BIN)/python -m bench.budget $(SOAK)

@@ -64,7 +64,9 @@ for _number, _handler in ((signal.SIGINT, signal.default_int_handler), (signal.S
 
 # How long an example takes depends on the machine only.
 _SLOW = [HealthCheck.too_slow]
-settings.register_profile("reproducible", deadline=None, derandomize=True, suppress_health_check=_SLOW)
+settings.register_profile(
+    "reproducible", max_examples=50, deadline=None, derandomize=True, suppress_health_check=_SLOW
+)
 settings.register_profile(
     "explore", deadline=None, max_examples=1000, print_blob=True, database=None, suppress_health_check=_SLOW
 )

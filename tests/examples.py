@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, settings
 
 
 def examples(share: float, *suppressed: HealthCheck) -> settings:
-    """Return settings with this share of the profile's examples: 100 in `make test`, 1000 in `make soak`.
+    """Return settings with this share of the profile's examples: 50 in `make test`, 1000 in `make soak`.
 
     Parameters
     ----------

@@ -46,7 +46,9 @@ def assert_found(results: Iterable[TrialResult]) -> None:
     assert [one for one in results if one.named_s is None and one.is_driving] == []
 
 
-@pytest.mark.parametrize("room", ["room", "furnished", "corridor"])
+@pytest.mark.parametrize(
+    "room", ["room", *(pytest.param(one, marks=pytest.mark.soak) for one in ("furnished", "corridor"))]
+)
 def test_an_honest_robot_drives_without_recognition(room: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A robot that stands would show nothing about lies."""
     monkeypatch.setattr("bench.lies.HONEST_S", 8.0)
@@ -86,7 +88,7 @@ def test_a_robot_with_a_wrong_clock_stops_by_name(
 @promised
 @pytest.mark.promise("P24")
 def test_a_ring_that_lies_is_named_and_nothing_is_touched(measured: Callable[[str], None]) -> None:
-    results = measure(drawn(RING, 4, 2), lambda _: None)
+    results = measure(drawn(RING, 2, 2), lambda _: None)
     assert_found(results)
     measured(summed_up(results))
 
@@ -95,9 +97,9 @@ def test_a_ring_that_lies_is_named_and_nothing_is_touched(measured: Callable[[st
 @pytest.mark.parametrize(
     "plan",
     [
-        ("hobby3", "corridor", "silent", 33100, 0),
+        pytest.param(("hobby3", "corridor", "silent", 33100, 0), marks=pytest.mark.soak),
         ("hobby8", "corridor", "silent", 33100, 2),
-        ("parking12", "corridor", "frozen", 33100, 0),
+        pytest.param(("parking12", "corridor", "frozen", 33100, 0), marks=pytest.mark.soak),
     ],
 )
 def test_few_sensors_that_fail_between_mirrors_touch_nothing_at_speed(plan: Plan) -> None:

@@ -17,7 +17,7 @@ def no_report(_: str) -> None:
 
 
 @pytest.mark.parametrize("rooms", [2, pytest.param(6, marks=pytest.mark.soak)])
-@pytest.mark.parametrize("model", ["cone", "mirrors"])
+@pytest.mark.parametrize("model", ["cone", pytest.param("mirrors", marks=pytest.mark.soak)])
 def test_generated_rooms_are_within_the_spread_of_the_real_ones(model: str, rooms: int) -> None:
     """Between the two real drives, or beyond one of them by no more than a quarter of it or .03 (m, or a share)."""
     rows = measure(range(100, 100 + rooms), (model,), None, no_report)

@@ -25,9 +25,9 @@ from tests.hil.machine import TIMEOUT_S
 ARGUMENTS = ("--disable-gpu", "--disable-dev-shm-usage", "--force-color-profile=srgb")
 
 
-@pytest_asyncio.fixture(scope="session", loop_scope="session")
+@pytest_asyncio.fixture(scope="package", loop_scope="session")
 async def pool() -> AsyncIterator[PagePool]:
-    """Pages of one browser for all tests."""
+    """Pages of one browser for all tests; it ends with the last of these, as it computes a little all the time."""
     program = shutil.which("chromium-headless-shell") or shutil.which("chromium")
     assert program is not None, "chromium is missing: `make test` installs it, or apt-get install chromium"
     expect.set_options(timeout=1000 * TIMEOUT_S)

@@ -41,7 +41,7 @@ async def faint_texts(opened: Opened) -> list[tuple[str, float]]:
     return [(words, round(ratio, 2)) for words, ratio, large in texts if ratio < (AA_LARGE if large else AA)]
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["dark", pytest.param("light", marks=pytest.mark.soak)])
 async def test_all_text_has_contrast_in_every_panel_and_mode(
     server: FakeServer, opener: Opener, scheme: Literal["light", "dark"]
 ) -> None:
@@ -71,11 +71,19 @@ DESKTOPS = {"desktop": DESKTOP, "projector": PROJECTOR, "laptop": (1024, 768), "
 HANDHELDS = {"phone": PHONE, "side": (740, 360)}
 
 
-@pytest.mark.parametrize("touch", [False, True], ids=["desktop", "handheld"])
+@pytest.mark.parametrize(
+    "sizes",
+    [
+        pytest.param({"laptop": DESKTOPS["laptop"], "tablet": DESKTOPS["tablet"]}, id="desktop"),
+        pytest.param({"phone": PHONE}, id="handheld"),
+        pytest.param(DESKTOPS, id="desktops", marks=pytest.mark.soak),
+        pytest.param(HANDHELDS, id="handhelds", marks=pytest.mark.soak),
+    ],
+)
 async def test_it_fits_every_screen_and_every_control_has_a_name(
-    server: FakeServer, opener: Opener, *, touch: bool
+    server: FakeServer, opener: Opener, sizes: dict[str, tuple[int, int]]
 ) -> None:
-    sizes = HANDHELDS if touch else DESKTOPS
+    touch = "phone" in sizes
     opened = await scene(server, opener, next(iter(sizes.values())), touch=touch)
     for name, size in sizes.items():
         await opened.page.set_viewport_size({"width": size[0], "height": size[1]})
@@ -102,7 +110,9 @@ async def test_it_fits_every_screen_and_every_control_has_a_name(
 
 
 @pytest.mark.parametrize("schemes", [("light",), pytest.param(("light", "dark"), marks=pytest.mark.soak)], ids=str)
-@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+@pytest.mark.parametrize(
+    "size", [pytest.param(DESKTOP, id="desktop"), pytest.param(PHONE, id="phone", marks=pytest.mark.soak)]
+)
 async def test_axe_finds_nothing_on_any_tab(
     server: FakeServer, opener: Opener, size: tuple[int, int], schemes: tuple[Literal["light", "dark"], ...]
 ) -> None:

@@ -166,7 +166,14 @@ async def test_a_table_of_plots_leaves_silence_empty(server: FakeServer, opener:
     assert {line.split(",")[at] for line in lines[1:]} == {""}
 
 
-@pytest.mark.parametrize("size", [DESKTOP, LAPTOP, PHONE], ids=["1440", "1024", "phone"])
+@pytest.mark.parametrize(
+    "size",
+    [
+        pytest.param(DESKTOP, id="1440", marks=pytest.mark.soak),
+        pytest.param(LAPTOP, id="1024"),
+        pytest.param(PHONE, id="phone", marks=pytest.mark.soak),
+    ],
+)
 async def test_the_bar_is_whole_whatever_stands_in_it(
     server: FakeServer, opener: Opener, size: tuple[int, int]
 ) -> None:

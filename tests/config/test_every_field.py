@@ -7,6 +7,7 @@ are composed here, independently of the code under test.
 from __future__ import annotations
 
 import copy
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -322,9 +323,12 @@ NUMBERS = [s for s in SETTINGS if s.kind is float]
 
 
 @pytest.mark.compiled
-def test_neither_infinite_nor_nan(tmp_path: Path) -> None:
+@pytest.mark.parametrize("each", [1, pytest.param(3, marks=pytest.mark.soak)])
+def test_neither_infinite_nor_nan(each: int, tmp_path: Path) -> None:
+    """The short form tries one of the three on each, in turn."""
+    values = itertools.cycle((float("inf"), float("-inf"), float("nan")))
     for setting in NUMBERS:
-        for value in (float("inf"), float("-inf"), float("nan")):
+        for value in itertools.islice(values, each):
             assert_one_line(setting, changed(setting, value), tmp_path, f"{setting.path} = {value}: must be ")
 
 

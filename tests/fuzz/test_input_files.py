@@ -23,7 +23,7 @@ from tests.fuzz.hazards import HAZARDS
 from tests.fuzz.mutators import mutate
 
 ROOT = Path(__file__).parents[2]
-FILES = 150
+FILES = 80
 SOAK_FILES = 20_000
 """For each of the five kinds, 10⁵ in all."""
 MEMORY_MAX_MB = 500
@@ -125,7 +125,7 @@ def random_log(rng: random.Random, sensors: int) -> str:
 def test_random_logs_are_replayed(method: str, tmp_path: Path) -> None:
     settings = load_settings("hallway", [f"perception.method={method}"])
     rng = random.Random(14)
-    for _ in range(40):
+    for _ in range(15):
         path = tmp_path / "log.csv"
         path.write_text(random_log(rng, len(settings.ring.mounts)))
         try:

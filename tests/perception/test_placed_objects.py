@@ -66,7 +66,7 @@ def strayed(seed: int, model: Reflection, minutes: float) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize(("seed", "model"), [(0, "specular"), (3, "cone")])
+@pytest.mark.parametrize(("seed", "model"), [pytest.param(0, "specular", marks=pytest.mark.soak), (3, "cone")])
 def test_a_placed_object_never_wanders(seed: int, model: Reflection) -> None:
     assert strayed(seed, model, 0.5) == []
 

@@ -43,7 +43,7 @@ def blocked_within(found: Cells, before: bytes, target_m: float = 9.0) -> bytes:
 
 
 @pytest.mark.parametrize("seed", range(40))
-@pytest.mark.boundscheck
+@pytest.mark.boundslong
 def test_a_sector_is_crossed_where_the_disc_would_touch_a_cell(seed: int) -> None:
     rng = np.random.default_rng(seed)
     places = [(float(x), float(y)) for x, y in rng.uniform(-2.5, 2.5, (seed, 2))]
@@ -100,7 +100,7 @@ def test_a_sector_with_less_room_than_is_wanted_is_blocked_and_closed_only_if_th
 
 
 @pytest.mark.parametrize("seed", range(12))
-@pytest.mark.boundscheck
+@pytest.mark.boundslong
 def test_cells_are_those_of_the_grid_and_the_fresh_echoes(seed: int) -> None:
     rng = np.random.default_rng(seed)
     place = rng.uniform(-7.5, 7.5, 2)  # some are outside the grid

@@ -24,7 +24,7 @@ from config.world import DrumConfig, WallConfig, WorldConfig
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("rooms", [(700, 703), pytest.param(range(700, 760), marks=pytest.mark.soak)])
+@pytest.mark.parametrize("rooms", [(703,), pytest.param(range(700, 760), marks=pytest.mark.soak)])
 def test_it_arrives_across_random_rooms_and_touches_nothing(rooms: Sequence[int]) -> None:
     settings = load_settings("hallway", ["perception.method=paper", "perception.grid.method=directed"])
     trials = [random_trial(seed, settings) for seed in rooms]

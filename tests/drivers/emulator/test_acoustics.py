@@ -94,7 +94,7 @@ def random_cases(
 
 
 @pytest.mark.parametrize("worlds", WORLDS)
-@pytest.mark.boundscheck
+@pytest.mark.boundslong
 def test_cone_is_exactly_the_nearest_point_in_the_beam(worlds: int) -> None:
     heard = 0
     for world, shapes, sensors, half in random_cases(1, worlds):
@@ -120,7 +120,7 @@ def test_cone_agrees_with_densely_sampled_surfaces() -> None:
 
 
 @pytest.mark.parametrize("worlds", WORLDS)
-@pytest.mark.boundscheck
+@pytest.mark.boundslong
 def test_specular_is_exactly_the_first_visible_mirror(worlds: int) -> None:
     heard = 0
     for world, shapes, sensors, half in random_cases(3, worlds):
@@ -168,7 +168,7 @@ def one_of(rng: np.random.Generator, *names: str | None) -> Callable[[], str | N
 
 @pytest.mark.parametrize("model", ["specular", "rays"])
 @pytest.mark.parametrize("worlds", WORLDS)
-@pytest.mark.boundscheck
+@pytest.mark.boundslong
 def test_mixed_surfaces_answer_each_by_its_own_model(model: str, worlds: int) -> None:
     heard, rng = 0, np.random.default_rng(6)
     for world, _, sensors, half in random_cases(7, worlds):

@@ -55,7 +55,7 @@ def pair(world: WorldConfig, apart_m: float = 0.2, *, specular: bool = True, tur
 
 @pytest.mark.parametrize("worlds", WORLDS)
 @pytest.mark.parametrize("specular", [True, False])
-@pytest.mark.boundscheck
+@pytest.mark.boundslong
 def test_paths_are_the_least_to_a_micrometre(worlds: int, specular: bool) -> None:
     heard, rng = 0, np.random.default_rng(10)
     for world, shapes, sensors, half in random_cases(11 + specular, worlds):

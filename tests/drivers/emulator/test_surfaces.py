@@ -14,7 +14,7 @@ from tests.drivers.emulator.one_sensor import drum, wall
 from tests.drivers.emulator.test_acoustics import random_cases
 
 
-@pytest.mark.boundscheck
+@pytest.mark.boundslong
 def test_a_ray_stops_at_the_first_surface() -> None:
     for world, shapes, sensors, _ in random_cases(12, 30):
         scene = compile_scene(world)

@@ -100,7 +100,7 @@ SIXTEEN = range(8300, 8316)
 @pytest.mark.parametrize(
     ("robot", "before_m", "seeds"),
     [
-        ("denning", 3.0, range(8200, 8201)), ("p3at", 0.0, range(8200, 8201)),
+        ("denning", 3.0, range(8200, 8201)), pytest.param("p3at", 0.0, range(8200, 8201), marks=pytest.mark.soak),
         *(pytest.param(robot, way_m, SIXTEEN, marks=pytest.mark.soak) for robot in RINGS for way_m in (0.0, 3.0)),
     ],
 )  # fmt: skip

@@ -78,7 +78,7 @@ def found(config: RingConfig, heard: Iterable[Firing]) -> Found:
 
 
 @promise
-@few_or(2, 50)
+@few_or(1, 50)
 def test_no_healthy_sensor_is_masked(halls: int, measured: Callable[[str], None]) -> None:
     """Random halls, specular and rough walls, with and without noise, on winding paths, the ring turning or not."""
     drives = 0
@@ -95,7 +95,7 @@ def test_no_healthy_sensor_is_masked(halls: int, measured: Callable[[str], None]
 
 
 @promise
-@pytest.mark.parametrize("acoustics", [MIRRORS, ROUGH, STRAYS])
+@pytest.mark.parametrize("acoustics", [MIRRORS, pytest.param(ROUGH, marks=pytest.mark.soak), STRAYS])
 def test_equal_readings_are_legitimate_if_nothing_should_change_them(
     acoustics: AcousticsConfig, measured: Callable[[str], None]
 ) -> None:
@@ -138,16 +138,16 @@ def test_a_rough_wall_along_the_way_is_no_fault_of_the_sensors_that_look_along_i
 @promise
 @few_or(1, 24)
 def test_a_stuck_sensor_is_masked_and_reported(halls: int, measured: Callable[[str], None]) -> None:
-    """Every sensor, stuck at the shortest range or at one in the middle; each in another hall."""
+    """Every sensor (of which the short form has each fourth), stuck near or in the middle; each in another hall."""
     ways: list[float] = []
-    for hall, sensor in itertools.product(range(halls), range(24)):
+    for hall, sensor in itertools.product(range(halls), range(0, 24, 4 if halls == 1 else 1)):
         stuck_m = (0.1524, 1.2)[(sensor + sensor // 2 + hall) % 2]
         world, path = random_hall(sensor + hall, NOISY)
         got = found(RING, firings(RING, world, path, {sensor: stuck_m}))
         assert set(got) == {(sensor, "stuck")}
         ways += got.values()
     measured(
-        f"{len(ways)} drives with a stuck sensor, each of 24: {len(ways)} masked, after {min(ways):.1f} to "
+        f"{len(ways)} drives, each with another sensor stuck: {len(ways)} masked, after {min(ways):.1f} to "
         f"{max(ways):.1f} m (median {np.median(ways):.1f})"
     )
 
@@ -268,7 +268,7 @@ TWO = tuple(tuple(range(k, 24, 2)) for k in range(2))
 
 
 @promise
-@few_or(2, 24)
+@few_or(1, 24)
 def test_octets_of_the_ring_s_own_beam_hear_no_partner(halls: int, measured: Callable[[str], None]) -> None:
     heard, _, honest, _ = crosstalk(ring("octets"), halls)
     assert heard == 0
@@ -276,7 +276,7 @@ def test_octets_of_the_ring_s_own_beam_hear_no_partner(halls: int, measured: Cal
 
 
 @promise
-@few_or(2, 24)
+@few_or(1, 24)
 @pytest.mark.parametrize(
     ("name", "config", "share"),
     [

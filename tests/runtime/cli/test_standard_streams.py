@@ -33,7 +33,7 @@ def shell(redirection: str, arguments: str, **environment: str) -> subprocess.Co
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full, the device that is always full")
-@pytest.mark.parametrize("arguments", [SETTINGS, "-u -m runtime.cli --version"])
+@pytest.mark.parametrize("arguments", [pytest.param(SETTINGS, marks=pytest.mark.soak), "-u -m runtime.cli --version"])
 def test_full_output_is_one_line_of_error(arguments: str, measured: Callable[[str], None]) -> None:
     done = shell(">/dev/full", arguments)
     assert done.returncode == FAILED
@@ -57,7 +57,7 @@ def test_a_stream_that_takes_nothing_changes_no_exit_code(redirection: str, argu
     assert (done.returncode, done.stdout, done.stderr) == (code, "", "")
 
 
-@pytest.mark.parametrize("arguments", [SETTINGS, "-m runtime.cli --help"])
+@pytest.mark.parametrize("arguments", [SETTINGS, pytest.param("-m runtime.cli --help", marks=pytest.mark.soak)])
 def test_a_reader_that_has_what_it_wants_is_no_failure(arguments: str) -> None:
     read, write = os.pipe()
     os.close(read)

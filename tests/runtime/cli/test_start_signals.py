@@ -46,11 +46,11 @@ main()
 """
 """Runs the command line and raises a signal at the n-th event of a kind; for Popen, it cannot fork its emulator."""
 MOMENTS: Final = [
-    ("import", 30, signal.SIGINT),
     ("import", 300, signal.SIGHUP),
-    ("tempfile.mkdtemp", 1, signal.SIGTERM),
     ("os.fork", 1, signal.SIGINT),
-    ("subprocess.Popen", 1, signal.SIGINT),
+    pytest.param("import", 30, signal.SIGINT, marks=pytest.mark.soak),
+    pytest.param("tempfile.mkdtemp", 1, signal.SIGTERM, marks=pytest.mark.soak),
+    pytest.param("subprocess.Popen", 1, signal.SIGINT, marks=pytest.mark.soak),
 ]
 
 
@@ -88,7 +88,7 @@ def test_a_signal_during_the_start_leaves_nothing(
         time.sleep(0.05)
     assert list(temporary.iterdir()) == []
     measured(
-        "SIGINT, SIGTERM and SIGHUP at five moments of a start: exit code 128 + n, no process, folder or traceback"
+        f"{number.name} during a start, at its {event} {count}: exit code 128 + n, no process, folder or traceback"
     )
 
 

@@ -38,7 +38,7 @@ def driven(robot: str, *faults: Fault, until_s: float = 20.0) -> Run:
     return run
 
 
-@pytest.mark.parametrize("robot", ["denning", "p3dx"])
+@pytest.mark.parametrize("robot", ["denning", pytest.param("p3dx", marks=pytest.mark.soak)])
 @pytest.mark.parametrize("lie", LIES)
 def test_it_stops_with_the_reason_before_it_touches_anything(
     lie: str, robot: str, measured: Callable[[str], None]

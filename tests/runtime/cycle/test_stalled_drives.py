@@ -67,11 +67,13 @@ def silent_s(robot: int, room: int, request: str, seconds: float) -> tuple[float
     return longest_s, reasons[1:]
 
 
-def assert_explained(robots: range, rooms: range, seconds: float) -> str:
+def assert_explained(
+    robots: range, rooms: range, seconds: float, requests: tuple[str, ...] = ("legs", "wander", "goal")
+) -> str:
     worst_s, stalled = 0.0, 0
     for robot in robots:
         for room in rooms:
-            for request in ("legs", "wander", "goal"):
+            for request in requests:
                 longest_s, reasons = silent_s(robot, room, request, seconds)
                 assert longest_s < SILENT_MAX_S, (
                     f"robot {robot}, room {room}, {request}: {longest_s:.1f} s, {reasons}"
@@ -81,12 +83,12 @@ def assert_explained(robots: range, rooms: range, seconds: float) -> str:
                     stalled + any(" for 20 s: " in reason for reason in reasons),
                 )
     assert stalled > 0
-    drives = len(robots) * len(rooms) * 3
+    drives = len(robots) * len(rooms) * len(requests)
     return f"{drives} drives of {seconds:g} s: at most {worst_s:.1f} s without progress and reason; {stalled} stalled"
 
 
 def test_no_drive_is_stalled_without_a_reason(measured: Callable[[str], None]) -> None:
-    measured(assert_explained(range(1), range(1), 42.0))
+    measured(assert_explained(range(1), range(1), 42.0, ("wander", "goal")))  # legs: see below
 
 
 @pytest.mark.soak

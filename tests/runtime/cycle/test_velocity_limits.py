@@ -88,11 +88,10 @@ def least_gap_m(settings: Settings, seed: int, seconds: float, teleoperated: boo
 
 
 @pytest.mark.parametrize("seed", [0])
-def test_a_mission_arrives_at_its_places_and_enters_no_zone(seed: int) -> None:
-    places = random_places(np.random.default_rng(seed))
-    settings = with_mission(
-        ROOM.model_copy(update={"places": places}), mission(to_place("lift"), to_place("charger"))
-    )
+@pytest.mark.parametrize("places", [("lift",), pytest.param(("lift", "charger"), marks=pytest.mark.soak)])
+def test_a_mission_arrives_at_its_places_and_enters_no_zone(seed: int, places: tuple[str, ...]) -> None:
+    room = ROOM.model_copy(update={"places": random_places(np.random.default_rng(seed))})
+    settings = with_mission(room, mission(*map(to_place, places)))
     gap_m, state = least_gap_m(settings, seed, 150.0)
     assert gap_m > -STOPPING_ERROR_M
     assert isinstance(state.drive_request, Mission)
@@ -111,12 +110,12 @@ def wandering(seed: int) -> MissionConfig:
     )
 
 
-@pytest.mark.parametrize("seed", [0])
-def test_neither_wander_nor_an_operator_enters_a_zone(seed: int) -> None:
+@pytest.mark.parametrize(("seed", "seconds"), [(0, 12.0), pytest.param(0, 25.0, marks=pytest.mark.soak)])
+def test_neither_wander_nor_an_operator_enters_a_zone(seed: int, seconds: float) -> None:
     places = random_places(np.random.default_rng(100 + seed))
     given = ROOM.model_copy(update={"places": places})
-    assert least_gap_m(with_mission(given, wandering(seed)), seed, 25.0)[0] > -STOPPING_ERROR_M
-    assert least_gap_m(given, seed, 25.0, teleoperated=True)[0] > -STOPPING_ERROR_M
+    assert least_gap_m(with_mission(given, wandering(seed)), seed, seconds)[0] > -STOPPING_ERROR_M
+    assert least_gap_m(given, seed, seconds, teleoperated=True)[0] > -STOPPING_ERROR_M
 
 
 @pytest.mark.soak
@@ -129,7 +128,7 @@ def test_nothing_enters_a_zone_in_many_rooms(seed: int) -> None:
     assert isinstance(state.drive_request, Mission)
     # Some draws leave no way between zones, walls and drums: the mission is held then, and says where it is stuck.
     assert state.drive_request.progress.status in {"done", "held"}, state.hold_reason
-    test_neither_wander_nor_an_operator_enters_a_zone(seed)
+    test_neither_wander_nor_an_operator_enters_a_zone(seed, 25.0)
 
 
 AREA = PlacesConfig(

@@ -230,10 +230,18 @@ def disk_of(size: int) -> Iterator[None]:
 
 
 WRITING = {name: command for name, command in COMMANDS.items() if "{out}" in command}
+SLOW = ("report", "export --to rosbag2", "export --to parquet")
+"""They write by what the others do, and take most of the time."""
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("command", WRITING.values(), ids=WRITING)
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(command, id=name, marks=[pytest.mark.soak] if name in SLOW else [])
+        for name, command in WRITING.items()
+    ],
+)
 def test_a_disk_that_fills_up(
     command: tuple[str, ...], hall_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -64,7 +64,7 @@ def drive(model: Model, start: Pose, goal: tuple[float, float], seed: int) -> tu
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("model", ["cone", "specular"])
+@pytest.mark.parametrize("model", [pytest.param("cone", marks=pytest.mark.soak), "specular"])
 def test_a_doorway_of_1_1_m_is_passed(model: Model) -> None:
     off, way, contacts = drive(model, Pose(-1.4, -0.3, 0.1), (0.9, 0.2), 1)
     assert off < 0.3

@@ -22,12 +22,13 @@ def test_forty_drums_that_do_not_overlap() -> None:
 
 
 @pytest.mark.compiled
-def test_tracks_suffice() -> None:
+@pytest.mark.parametrize("seconds", [25.0, pytest.param(600.0, marks=pytest.mark.soak)])
+def test_tracks_suffice(seconds: float) -> None:
     settings = long_hall_settings(load_settings("irregular"))
     clusters: list[int] = []
 
     def on_cycle(record: CycleRecord, _truth: object) -> None:
         clusters.append(record.clusters)
 
-    simulate(settings, long_hall(0), 0, 600.0, on_cycle)
+    simulate(settings, long_hall(0), 0, seconds, on_cycle)
     assert max(clusters) < settings.perception.bayes.tracks_max, max(clusters)

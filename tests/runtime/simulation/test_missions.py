@@ -21,6 +21,10 @@ SHORT_S = {
     "dock": 14.0, "dock-from-behind": 12.0, "guard": 12.0, "inspect-drums": 14.0, "mow": 12.0, "patrol": 20.0,
     "round-the-room": 14.0, "stay-on-path": 21.0, "there-and-back": 22.0, "wander": 12.0,
 }  # fmt: skip
+OF_EACH_KIND = ("dock", "guard", "patrol", "wander")
+"""Those which the quick form drives: with drums to recognise and without."""
+OF_EACH_KIND = ("dock", "guard", "patrol", "wander")
+"""Those which the quick form drives: with drums to recognise and without."""
 LONG_S = {"round-the-room": 150.0, "inspect-drums": 150.0, "wander": 125.0, "patrol": 120.0}
 NEEDS_DRUMS = {"dock", "dock-from-behind", "guard", "inspect-drums"}
 
@@ -93,7 +97,9 @@ COMPLETE: dict[str, Callable[[Drive], bool]] = {
 
 @pytest.mark.compiled
 @pytest.mark.promise("P32")
-@pytest.mark.parametrize("name", SHORT_S)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in OF_EACH_KIND else [pytest.mark.soak]) for name in SHORT_S]
+)
 def test_a_shipped_mission_does_what_it_is_named_for(name: str) -> None:
     assert SHORT_S.keys() == {*list_shipped("missions")}
     drive = driven(name, SHORT_S[name], *FAST)

@@ -66,7 +66,7 @@ def test_a_table_that_shows_too_little_is_refused_with_the_option() -> None:
         repeats(latched(make_drive(3, "denning", "hall", "cone"), 0.2))
 
 
-@pytest.mark.parametrize("robot", ["p3dx", "denning"])
+@pytest.mark.parametrize("robot", ["p3dx", pytest.param("denning", marks=pytest.mark.soak)])
 def test_noise_of_the_last_digit_does_not_make_last_values_fresh(robot: str) -> None:
     drive, rng = make_drive(3, robot, "room", "cone"), np.random.default_rng(3)
     clean = latched(drive)

@@ -30,7 +30,7 @@ def test_a_mirrored_ring_takes_each_column_for_the_sensor_on_the_other_side() ->
 
 
 @pytest.mark.parametrize("robot", ["denning", "p3dx"])
-@pytest.mark.parametrize("shift", [0, 1, 5])
+@pytest.mark.parametrize("shift", [0, pytest.param(1, marks=pytest.mark.soak), 5])
 @pytest.mark.parametrize("is_mirrored", [False, True])
 def test_columns_that_begin_with_another_sensor_are_found(robot: str, shift: int, *, is_mirrored: bool) -> None:
     drive = make_drive(11, robot, "room", "cone", 60.0)
@@ -64,7 +64,7 @@ def exchanges(count: int) -> dict[str, list[int]]:
 @pytest.mark.parametrize(
     ("robot", "model", "orders"),
     [
-        ("denning", "specular", ["neighbours"]), ("p3dx", "cone", ["two"]),
+        ("denning", "specular", ["neighbours"]), pytest.param("p3dx", "cone", ["two"], marks=pytest.mark.soak),
         ("amigo", "specular", ["one array backward"]),
         *(pytest.param(robot, model, [*exchanges(8)], marks=pytest.mark.soak)
           for robot in ("denning", "p3dx", "amigo") for model in ("cone", "specular")),
@@ -104,7 +104,7 @@ def test_two_neighbours_that_are_exchanged_are_found_in_a_hall_of_drums(robot: s
     assert found.sensors.tolist() == order
 
 
-@pytest.mark.parametrize(("seed", "robot"), [(202, "p3dx"), (202, "magellan")])
+@pytest.mark.parametrize(("seed", "robot"), [(202, "p3dx"), pytest.param(202, "magellan", marks=pytest.mark.soak)])
 def test_a_small_gain_among_mirrors_is_no_exchange(seed: int, robot: str) -> None:
     drive = make_drive(seed, robot, "hall", "specular", 150.0)
     table = Table(drive.t, drive.pose, np.where(np.isinf(drive.ranges), np.nan, drive.ranges))
@@ -129,7 +129,11 @@ def test_real_recordings_are_in_their_order(name: str) -> None:
     ("order", "named"),
     [
         ((0, 1, 12, *range(3, 12), 2, *range(13, 16)), "r02 is sensor 12, r12 is sensor 2 of the robot file"),
-        ((*range(7, -1, -1), *range(8, 16)), "r00 is sensor 7, r01 is sensor 6, r02 is sensor 5"),
+        pytest.param(
+            (*range(7, -1, -1), *range(8, 16)),
+            "r00 is sensor 7, r01 is sensor 6, r02 is sensor 5",
+            marks=pytest.mark.soak,
+        ),
     ],
 )
 def test_exchanged_columns_are_refused_with_their_sensors(order: tuple[int, ...], named: str, tmp_path: Path) -> None:

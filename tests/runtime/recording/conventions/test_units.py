@@ -189,7 +189,7 @@ def straight_first(firing: Firing) -> Firing:
     return replace(firing, pose=Pose(along + math.sin(angle), 1.0 - math.cos(angle), angle), ring_yaw=angle)
 
 
-@pytest.mark.parametrize("count", [1, 50, pytest.param(300, marks=pytest.mark.soak), 407])
+@pytest.mark.parametrize("count", [1, 50, *(pytest.param(count, marks=pytest.mark.soak) for count in (300, 407))])
 def test_a_log_in_metres_and_radians_passes_unchanged(count: int) -> None:
     given, said = list(drive_along(count)), list[str]()
     changes: list[Callable[[Firing], Firing]] = [

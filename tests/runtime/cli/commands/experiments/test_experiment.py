@@ -67,16 +67,17 @@ def test_the_papers_hallway(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 
 
 @pytest.mark.compiled
+@pytest.mark.parametrize(("method", "least"), [("paper", 4), pytest.param("bayes", 7, marks=pytest.mark.soak)])
 def test_an_experiment_leaves_recording_figures_and_page(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    method: str, least: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(animation, "FRAMES_MAX", 2)
     monkeypatch.setattr("runtime.analysis.plots.figure_files.FORMATS", ("svg",))
     out = tmp_path / "out"
-    outcome = experiment(tmp_path, "irregular", "--seeds", "2", "--out", str(out))
+    outcome = experiment(tmp_path, "irregular", "--method", method, "--seeds", "2", "--out", str(out))
     reported = capsys.readouterr().out
     by_seed = [outcome["drums"][8 * k : 8 * k + 8] for k in range(2)]
-    assert all(found(rows) >= 7 for rows in by_seed)
+    assert all(found(rows) >= least for rows in by_seed)
     spread = outcome["spread"]
     assert spread["seeds"] == 2
     assert spread["mean"] == pytest.approx(outcome["mean_error"], rel=0.2)

@@ -116,8 +116,8 @@ def test_the_line_of_a_robot_behind_ros_is_opened_as_its_family_does(monkeypatch
     assert given["opener"] is not None
 
 
-OF_EACH_KIND = ("denning", "p3dx", "b21r", "hobby3", "servo1")
-"""Robots of different drivers and bases; the others are tested in `make soak`."""
+OF_EACH_KIND = ("denning", "p3dx", "servo1")
+"""Robots of different drivers and rings; the others are tested in `make soak`."""
 ROBOTS = tuple(name for name in list_shipped("robots") if load_robot(name).robot.driver != "ros2")
 
 
@@ -151,8 +151,7 @@ def test_every_shipped_robot_is_tested_and_a_sensor_that_reads_what_it_cannot_is
         assert code == (NOT_SHOWN if ": hears nothing within" in found else FAILED)
 
 
-HOBBY = [pytest.param(one, marks=[] if one in OF_EACH_KIND else [pytest.mark.soak]) for one in
-         ("hobby3", "hobby8", "parking12", "servo1")]  # fmt: skip
+HOBBY = ["hobby3", *(pytest.param(one, marks=pytest.mark.soak) for one in ("hobby8", "parking12", "servo1"))]
 
 
 def lie(kind: str, **values: object) -> Fault:
