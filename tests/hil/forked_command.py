@@ -46,7 +46,7 @@ class ForkedCommand:
         def main() -> None:
             atexit._clear()  # those of the tests
             warnings.simplefilter("ignore")  # in tests they are errors
-            forked_child.THREADS = ()  # type: ignore[misc]  # numba is loaded, and has started no thread
+            forked_child.THREADS = ()  # type: ignore[misc, assignment]  # numba is loaded, and has started no thread
             prepare()
             command_main()
 
