@@ -29,7 +29,7 @@ PASSES: Final = 5000
 removing them costs 0.1 s, because every function of the product is looked at."""
 COMPILER: Final = ROOT / "perception" / "kernel_compiler.py"
 """Its byte code is part of each kernel's name in the cache: with probes in it, no run would find a kernel there."""
-KERNEL: Final = re.compile(r"^@(owning_)?kernel$", re.MULTILINE)
+KERNEL: Final = re.compile(r"^@([a-z]+_)?kernel$", re.MULTILINE)
 
 
 class MeasuredFiles:
