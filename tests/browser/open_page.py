@@ -23,6 +23,8 @@ PROBES = Path(__file__).parent / "probes"
 MODULE = "import('/page/main.js')"
 BEGIN = datetime(2026, 1, 2, 12, 0, 0, tzinfo=UTC)
 FRAME_MS = 16
+DRAWN_SELDOM = "window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 250);"
+"""On the browser's own clock: each state that comes would be drawn, which takes most of the time of such tests."""
 TOUR_SEEN = """if (location.protocol === 'http:' && localStorage.getItem('echolocate') === null)
     localStorage.setItem('echolocate', '{"tour seen": true}');"""
 
@@ -225,7 +227,8 @@ class Opener:
     async def open(
         self, url: str, size: tuple[int, int] = DESKTOP, *, scheme: Literal["dark", "light"] = "light",
         touch: bool = False, calm: bool = False, script: str | None = None, live: bool = True,
-        first_visit: bool = False, real_time: bool = False, expected_errors: str | None = None,
+        first_visit: bool = False, real_time: bool = False, drawn_seldom: bool = False,
+        expected_errors: str | None = None,
     ) -> Opened:  # fmt: skip
         """Open a page and wait for its first state.
 
@@ -237,6 +240,8 @@ class Opener:
             Whether the tour of the page has not been seen.
         real_time
             Whether the page has the browser's own clock.
+        drawn_seldom
+            Whether it then draws four times a second.
         expected_errors
             A pattern of the errors that belong to the test; any other fails it.
         """
@@ -245,6 +250,8 @@ class Opener:
             self._contexts.append(context)
             if script is not None:
                 await context.add_init_script(script)
+            if drawn_seldom:
+                await context.add_init_script(DRAWN_SELDOM)
             if not real_time:
                 await stop_clock(context)
             page = await context.new_page()

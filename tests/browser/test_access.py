@@ -121,7 +121,7 @@ async def test_axe_finds_nothing_on_any_tab(
     Its rule for contrast takes most of its time, and the quick form leaves that to the test above of all texts.
     """
     rules = {"color-contrast": {"enabled": len(schemes) > 1}}
-    opened = await scene(server, opener, size, real_time=True, first_visit=True)
+    opened = await scene(server, opener, size, real_time=True, drawn_seldom=True, first_visit=True)
     page = opened.page
     await page.evaluate(files("axe_playwright_python").joinpath("axe.min.js").read_text("utf-8"))
 

@@ -133,12 +133,12 @@ async def test_an_operator_watches_edits_drives_halts_and_is_lost(tmp_path: Path
     """Operate one run from its start to its end, then replay it: every action comes out bit-identically."""
     async with run(tmp_path, opener) as robot:
         wrong = robot.url.split("token=", maxsplit=1)[0] + "token=" + "A" * 22
-        stranger = await opener.open(wrong, live=False, real_time=True, expected_errors=REFUSED)
+        stranger = await opener.open(wrong, live=False, real_time=True, drawn_seldom=True, expected_errors=REFUSED)
         await stranger.says("#banner-connection", "token is missing or wrong")
         assert not await stranger.world("run.fresh")
         await stranger.page.close()
 
-        opened = await opener.open(robot.url, real_time=True)
+        opened = await opener.open(robot.url, real_time=True, drawn_seldom=True)
         await drives(robot, opened, f"{KNOWN_DRUMS} >= 3 && run.segments.size > 30", "something to handle")
         assert await opened.world("run.state.ranges.some((r) => r > 0)")
         await drives(robot, opened, "run.chart.length > 10", "a chart of some seconds")

@@ -51,14 +51,14 @@ async def test_halt_one_halt_all_and_a_frozen_run(tmp_path: Path, opener: Opener
             (tmp_path / name).mkdir()
             runs.append(await stack.enter_async_context(run(tmp_path / name, opener)))
         url = await stack.enter_async_context(fleet_page(runs))
-        opened = await opener.open(url, real_time=True, live=False)
+        opened = await opener.open(url, real_time=True, drawn_seldom=True, live=False)
         await operate(opened.page, runs)
         await opened.save_screenshot("fleet")
 
 
 async def test_the_page_fits_a_phone(opener: Opener) -> None:
     async with fleet_page([]) as url:
-        opened = await opener.open(url, PHONE, real_time=True, live=False)
+        opened = await opener.open(url, PHONE, real_time=True, drawn_seldom=True, live=False)
         await expect(opened.page.locator("#fleet-none")).to_be_visible()
         await opened.save_screenshot("fleet-phone")
         wide = await opened.page.evaluate(
@@ -74,7 +74,9 @@ async def test_the_page_fits_a_phone(opener: Opener) -> None:
 
 async def test_a_halt_that_was_not_sent_stays_said_until_one_is(opener: Opener) -> None:
     async with fleet_page([]) as url:
-        opened = await opener.open(url, real_time=True, live=False, expected_errors="Failed to load resource")
+        opened = await opener.open(
+            url, real_time=True, drawn_seldom=True, live=False, expected_errors="Failed to load resource"
+        )
         page, alarm = opened.page, opened.page.locator("#fleet-alarm")
         await page.route("**/halt", lambda route: route.fulfill(status=500, body="broken"))
         await page.locator("#halt-all").click()

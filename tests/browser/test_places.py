@@ -51,7 +51,7 @@ async def drag(opened: Opened, begin: tuple[float, float], end: tuple[float, flo
 
 async def ready(case: ConsoleCase, opener: Opener) -> Opened:
     """Open the page at the Drive tab, with a map that stays where it is."""
-    opened = await opener.open(case.console.url, real_time=True)
+    opened = await opener.open(case.console.url, real_time=True, drawn_seldom=True)
     await opened.page.evaluate(
         "async () => { const { view } = await import('/page/main.js');"
         " view.fit({ left: -2, right: 4, bottom: -2, top: 3 }); view.touched = true; }"
