@@ -25,7 +25,7 @@ from drivers.emulator.faults import Fault
 from drivers.emulator.memory_transport import MemoryLine
 from drivers.registry import make_device, make_driver
 from runtime.cycle.drive_requests import first_request, needs_recognition
-from runtime.cycle.echo_watch import NOTHING_NEW, NOTHING_YET
+from runtime.cycle.echo_watch import NOTHING_NEW, NOTHING_SO_FAR, NOTHING_YET
 from runtime.cycle.inputs import OperatorInput, Request, gather_inputs
 from runtime.cycle.modes import Mode
 from runtime.cycle.mounting_limit import ARM_DOUBTED, DOUBTED
@@ -80,7 +80,7 @@ BUILT: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
 """Faults that a robot is built with: they are there from the start."""
 CLOCK, OF_TWO = "clock", ("exchanged", "but one")
 """Kinds with these words change nothing on a robot whose packets carry no stamps, and on one with one sensor."""
-HELD: Final = frozenset({LOST, NOTHING_NEW, NOTHING_YET, REMEMBERED, UNHEARD})
+HELD: Final = frozenset({LOST, NOTHING_NEW, NOTHING_SO_FAR, NOTHING_YET, REMEMBERED, UNHEARD})
 """Reasons to hold that name a lie; that of a ring which seems to be turned names only one that is."""
 AHEAD_DEG: Final = 60.0
 MOVED_M: Final = 0.5

@@ -18,8 +18,8 @@ LIMITS: Sequence[str] = (
     "A map of the room contradicts them; without one, only a bumper stops the robot.",
     "A ring that hears nothing from its first reading on: the robot creeps at 0.04 m/s, says why, and is stopped "
     "after 1 m; what stands within it is touched at no more. If the ring reaches less than 3 m, which hears a room "
-    "late, the robot drives as usual, and is stopped after 4 m less its reach (`servo1`: 2.3 m; 3 of 12 drives among "
-    "mirrors touched something). So does an honest ring in the open.",
+    "late, the robot creeps on without a stop. So does an honest ring in the open (`servo1` in the middle of a room: "
+    "for a minute), until it is halted and armed again after 1 m.",
     "A part of the ring that freezes or falls silent while the rest still hears: a sensor that does not change is "
     "named after a metre or two on which its neighbours change, and what stood ahead may be touched before. Half of "
     "the ring that freezes is named after 0.3 to 6 s (30 of 30 drives), but one by one, from its edge: where no "

@@ -719,7 +719,7 @@ interface StateMessage {
   link: LinkRow | null;
   waiting: number;
   localized: LocalizedRow | null;
-  sensors: Array<[number, "failing" | "stuck" | "too_near" | "silent" | "crosstalk", string]>;
+  sensors: Array<[number, "failing" | "stuck" | "too_near" | "silent" | "at_maximum" | "crosstalk", string]>;
   playback: PlaybackRow | null;
   segments: SegmentRows;
   archived?: Array<ObjectRow>;

@@ -15,7 +15,7 @@ from config.robot import BodyConfig, RingConfig
 from drivers.denning import diagnostics
 from drivers.denning.frames import TENTH_FT_M, WINDOW_MAX, Echo, Echo2, Echo3, Odom
 from drivers.denning.wire_units import cross_paths_of, odometry_of, ranges_of
-from drivers.dropped_count import RANGES_BEYOND, DroppedCount
+from drivers.dropped_count import RANGES_BEYOND, DroppedCount, MaximumBeyond
 from drivers.messages import CrossPaths, Firing, Floats, Odometry
 from drivers.odometry_history import OdometryHistory
 from drivers.robot_clock import Jump, RobotClock
@@ -44,6 +44,7 @@ class PoseStamper(Stamper):
         super().__init__(body)
         self.out_of_window = DroppedCount(RANGES_BEYOND, self.note)
         """Ranges and cross paths dropped because they lie beyond the window of their firing."""
+        self._maximum = MaximumBeyond(self.note)
         self._axes = tuple(mount.angle_rad for mount in ring.mounts)
         self._views = ServoViews(ring)
         self._clock = RobotClock()
@@ -123,15 +124,19 @@ class PoseStamper(Stamper):
     def echo(self, echo: Echo | Echo2 | Echo3, unit_m: float = TENTH_FT_M) -> None:
         """Take an echo frame, whose counts are of `unit_m`; `firings` returns it as soon as its pose is known.
 
-        A range beyond the window belongs to an earlier firing or is noise, and is treated like a sensor's fault.
+        A range beyond the window belongs to an earlier firing or is noise, and is treated like a sensor's fault,
+        unless sensors report it in place of silence.
         """
         ranges, heard = ranges_of(echo, self._views, unit_m), cross_paths_of(echo, self._axes, unit_m)
         slack_m = 0.0 if isinstance(echo, Echo) else unit_m  # a range at the window's end is rounded to a count
         window_m = self._window * TENTH_FT_M + slack_m
         beyond = [sensor for sensor, range_m in enumerate(ranges.tolist()) if window_m < range_m < math.inf]
-        if beyond:
-            self.out_of_window.add(len(beyond))
-            ranges[beyond] = math.nan
+        for sensor in beyond:
+            if self._maximum.is_silence(sensor, float(ranges[sensor]), unit_m):
+                ranges[sensor] = math.inf
+            else:
+                self.out_of_window.add()
+                ranges[sensor] = math.nan
         if heard is not None:
             heard = self._within(heard, window_m)
         if len(self._held) >= _HELD_MAX:

@@ -7,10 +7,10 @@ from typing import Annotated, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.bounds import FINITE, FLAG, PLACE, Count, Place, Share, index_of, up_to
+from perception.bounds import FINITE, FLAG, PLACE, POSITIVE, Count, Flag, Place, Share, index_of, up_to
 from perception.kernel import Floats, Ints
 from perception.records import Record, Records
-from perception.sensor_faults.report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
+from perception.sensor_faults.report import AT_MAXIMUM, CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
 
 SETS_MAX: Final = 32
 """Sets of sensors that fire together that are distinguished; a firing pattern has at most 24."""
@@ -24,6 +24,8 @@ RANGE_OR_NONE: Final = PLACE._replace(infinite=True)
 
 LOOKS_KEPT: Final = 16
 """Looks of each sensor that are kept, `silence.LOOKS_APART_M` or half a beam apart: a turn by 90°, or 1.6 m."""
+FARTHEST_KEPT: Final = 16
+"""Looks in the last step of the range that are kept: more than there are directions a beam apart."""
 
 
 class NeighbourCounts(Record):
@@ -84,7 +86,7 @@ class SensorMemory(Record):
     """Consecutive readings away from that value."""
     too_near: Annotated[int, up_to(TOO_NEAR_READINGS)]
     """Readings below the least range, less the others."""
-    faults: Annotated[int, up_to(STUCK | SILENT | FAILING | CROSSTALK | TOO_NEAR)]
+    faults: Annotated[int, up_to(STUCK | SILENT | FAILING | CROSSTALK | TOO_NEAR | AT_MAXIMUM)]
     """Fault bits of `perception.sensor_faults.report`."""
     short_readings: Annotated[Floats, SETS_MAX, FINITE]
     """For each set, short readings less those that were not."""
@@ -132,6 +134,16 @@ class RingMemory(Record):
     """Looks of all sensors at something that others heard from both sides."""
     misses: Count
     """Those of these looks that have no echo."""
+    too_near_nat: Annotated[float, POSITIVE]
+    """Evidence that readings below the least range stand for nothing that is there, nat, of all sensors."""
+    farthest: Annotated[Records[SensorLook], FARTHEST_KEPT]
+    """Looks in the last step of the range, of the number n in place n % FARTHEST_KEPT."""
+    farthest_looks: Count
+    """Number of the next one."""
+    maximum_nat: Annotated[float, POSITIVE]
+    """Evidence that the greatest range stands for a silence, nat."""
+    is_maximum_nothing: Flag
+    """Whether it was enough; until it is gone."""
 
 
 class RingSetup(NamedTuple):
@@ -153,3 +165,5 @@ class RingSetup(NamedTuple):
     """Ranges below this cannot be measured, m."""
     near: float
     """What is farther away is not compared between sensors, m."""
+    last_step: tuple[float, float]
+    """The last step of the range: from and to, m."""

@@ -11,8 +11,10 @@ A single reading proves nothing; how readings change while the robot moves and w
 - *Silent.* The sensor hears nothing of what others heard where it looks, from both sides of its axis
   (`perception.sensor_faults.silence`). Its silence, which would mean free space, is not mapped; its first echo is. It
   still counts as a look (`perception.obstacle_echoes.fresh_echoes`), which has no echo.
-- *Too near.* The sensor answers ranges below the least that it can measure.
+- *Too near.* The sensor answers ranges below the least that it can measure, or several do so in turn.
 - *Failing.* The sensor should fire and reports no range, however often the ring fires.
+- *At its maximum.* The ring answers its greatest range where it hears nothing
+  (`perception.sensor_faults.maximum`): then that is a silence.
 - *Crosstalk.* EERUF's idea (Borenstein & Koren 1995): a true echo does not depend on which other sensors fired. A
   reading that is shorter than the one before it in another set of sensors is not trusted until a reading in another
   set agrees, which delays a true echo by one firing. If a sensor repeatedly reads short in one set only, it is masked
@@ -39,7 +41,7 @@ from perception.kernel import Floats, Ints, kernel
 from perception.records import Records, records, zeros
 from perception.sensor_faults.memory import SETS_MAX, RingMemory, RingSetup, SensorMemory
 from perception.sensor_faults.reading_tests import FAULTS_CHANGED, LESS_POSSIBLE, LESS_TRUSTED, check_firing
-from perception.sensor_faults.report import SILENT, STUCK, SensorReport, describe_fault
+from perception.sensor_faults.report import AT_MAXIMUM, SILENT, STUCK, SensorReport, describe_fault
 from perception.sensor_faults.silence import miss_share
 from perception.sensor_mounts import mounts_array, ring_pose
 
@@ -53,6 +55,8 @@ LEAST_SHARE: Final = 0.95
 """What is below this share of the least range cannot be measured: temperature changes ranges by at most 5 %."""
 TOLERANCE_MIN_M: Final = 0.005
 """Least tolerance for equal readings, for rings that do not quantise."""
+SAME_STEP_M: Final = 1e-6
+"""Rounding of a range, m."""
 TOLERANCE_STEPS: Final = 1.1
 """Tolerance for equal readings in steps of the ring's quantisation: one step and some rounding."""
 
@@ -101,11 +105,11 @@ def fires(ring: RingConfig) -> NDArray[np.bool_]:
 
 @kernel
 def are_sound(sensors: Records[SensorMemory]) -> bool:
-    """Return whether no sensor has a fault other than that it is silent, which does not touch what it hears."""
+    """Return whether no sensor has a fault but in what it reports for nothing, which does not touch what it hears."""
     faults = 0
     for i in range(len(sensors)):
         faults |= sensors[i].faults
-    return faults & ~SILENT == 0
+    return faults & ~(SILENT | AT_MAXIMUM) == 0
 
 
 class SensorMonitor:
@@ -127,6 +131,7 @@ class SensorMonitor:
         _tolerance=CONSTANT,
         _least=CONSTANT,
         _near=CONSTANT,
+        _last_step=CONSTANT,
         _sensors=SensorMemory.BOUNDS,
         _ring=RingMemory.BOUNDS,
         _sets=FLAG,
@@ -146,6 +151,8 @@ class SensorMonitor:
         self._tolerance = max(TOLERANCE_STEPS * ring.resolution_m, TOLERANCE_MIN_M)
         self._least = LEAST_SHARE * ring.range_min_m
         self._near = NEAR_SHARE * ring.range_max_m
+        half_step = max(0.5 * ring.resolution_m, SAME_STEP_M)
+        self._last_step = ring.range_max_m - half_step, ring.range_max_m + half_step
         self._setup = RingSetup(
             mounts,
             self._turns,
@@ -155,6 +162,7 @@ class SensorMonitor:
             self._tolerance,
             self._least,
             self._near,
+            self._last_step,
         )
         self._sensors = zeros(SensorMemory, count)
         self._sensor_records = records(SensorMemory, self._sensors)
@@ -193,7 +201,7 @@ class SensorMonitor:
 
     def _between_sound(self, heard: CrossPaths) -> CrossPaths:
         """Return the cross paths without those of sensors that have a fault; what a silent one hears is real."""
-        faulty = (self._sensors["faults"] & ~SILENT) != 0
+        faulty = (self._sensors["faults"] & ~(SILENT | AT_MAXIMUM)) != 0
         sound = ~(faulty[heard.transmitters] | faulty[heard.listeners])
         return CrossPaths(heard.transmitters[sound], heard.listeners[sound], heard.half_paths_m[sound])
 

@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from perception.kernel import Floats, Ints, entry_kernel, kernel
 from perception.records import Records
 from perception.sensor_faults.crosstalk import count_short_readings, find_set, is_doubtful
-from perception.sensor_faults.memory import TOO_NEAR_READINGS, RingMemory, RingSetup, SensorMemory
-from perception.sensor_faults.report import CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
+from perception.sensor_faults.maximum import stands_for_nothing
+from perception.sensor_faults.memory import RingMemory, RingSetup, SensorMemory
+from perception.sensor_faults.report import AT_MAXIMUM, CROSSTALK, FAILING, SILENT, STUCK, TOO_NEAR
 from perception.sensor_faults.silence import weigh_silence
+from perception.sensor_faults.too_near import count_too_near
 from perception.sensor_faults.turning import follow_turn, repeats_through_turn
 from perception.sensor_faults.wall import NOISE_SHARE, is_along_wall
 from perception.sensor_mounts import RingPose
@@ -232,19 +234,6 @@ def update_run_faults(
 
 
 @kernel
-def count_too_near(c: SensorMemory, is_too_near: bool) -> None:
-    """Set or clear a sensor's fault `TOO_NEAR`, given whether its reading is below the least that it can measure.
-
-    An object so near that the sensor rings on looks the same, and must not be driven at either.
-    """
-    c.too_near = min(TOO_NEAR_READINGS, c.too_near + 1) if is_too_near else max(0, c.too_near - 1)
-    if c.too_near == TOO_NEAR_READINGS:
-        c.faults |= TOO_NEAR
-    elif c.too_near == 0:
-        c.faults &= ~TOO_NEAR
-
-
-@kernel
 def follow_run(
     i: int,
     r: float,
@@ -353,13 +342,19 @@ def check_firing(
             continue
         c.missed = 0
         c.faults &= ~FAILING
-        count_changes(c, r, setup.tolerance)
-        follow_run(i, r, pose, setup, sensors, ring)
         own_yaw = yaw + setup.turns[i]
         axis = own_yaw + mounts[i, 2]
-        update_run_faults(i, r, x, y, axis, setup, sensors, ring)
         cos, sin = math.cos(own_yaw), math.sin(own_yaw)
         own_x, own_y = x + cos * mounts[i, 0] - sin * mounts[i, 1], y + sin * mounts[i, 0] + cos * mounts[i, 1]
+        if stands_for_nothing(r, own_x, own_y, axis, setup, ring):
+            r = trusted[i] = possible[i] = math.inf
+            c.faults |= AT_MAXIMUM
+            changed |= LESS_TRUSTED | LESS_POSSIBLE
+        elif not ring[0].is_maximum_nothing:
+            c.faults &= ~AT_MAXIMUM
+        count_changes(c, r, setup.tolerance)
+        follow_run(i, r, pose, setup, sensors, ring)
+        update_run_faults(i, r, x, y, axis, setup, sensors, ring)
         c.faults &= ~SILENT
         if weigh_silence(i, r, own_x, own_y, axis, half_angle, setup.near, sensors, ring):
             c.faults |= SILENT
@@ -376,7 +371,7 @@ def check_firing(
         for k in range(sets.shape[0]):
             if c.is_crossed[k]:
                 c.faults |= CROSSTALK
-        count_too_near(c, r < setup.least)
+        count_too_near(c, r < setup.least, ring)
         lost = lost_trust(c, r, fired_set, setup.least)
         if lost & LESS_TRUSTED:
             trusted[i] = math.nan

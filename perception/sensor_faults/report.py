@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
-SensorFault: TypeAlias = Literal["failing", "stuck", "too_near", "silent", "crosstalk"]
+SensorFault: TypeAlias = Literal["failing", "stuck", "too_near", "silent", "at_maximum", "crosstalk"]
 
-STUCK, SILENT, FAILING, CROSSTALK, TOO_NEAR = (1 << bit for bit in range(5))
+STUCK, SILENT, FAILING, CROSSTALK, TOO_NEAR, AT_MAXIMUM = (1 << bit for bit in range(6))
 """Bits of a sensor's fault word. A sensor may have several faults; the most severe one is reported."""
 ODDS_DIGITS_MAX: Final = 12
 """Greater odds say no more: the looks are not independent."""
@@ -79,6 +79,13 @@ def describe_fault(
             f"sensor {sensor} has heard nothing in {deaf_looks} looks at what other sensors heard there; they miss "
             f"{miss_share:.0%} of such looks, so the odds are {odds(deaf_looks, miss_share)} that it is deaf or "
             f"covered: its silence is masked until its first echo; check that nothing covers it, then replace it",
+        )
+    if faults & AT_MAXIMUM:
+        return SensorReport(
+            sensor,
+            "at_maximum",
+            f"sensor {sensor} answers the greatest range where it hears nothing, as this ring does in all "
+            f"directions: taken for silence; let its driver report that as no echo, or check that it hears",
         )
     return SensorReport(
         sensor,

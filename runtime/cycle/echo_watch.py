@@ -1,9 +1,9 @@
 """The watch on a ring that hears no echo: wires that carry none look like open space.
 
 A pin that a 5 V echo destroyed, a ring without its supply, a ring under a cover: each firing reports silence. So
-does open ground. A robot that has never heard an echo is stopped once, after a short way, with what to try; armed
-again it drives on. If its ring reaches far, so that it would hear any room, it drives slowly until then
-(`runtime.cycle.unheard_limit`).
+does open ground. A robot that has never heard an echo drives slowly (`runtime.cycle.unheard_limit`). If its ring
+reaches far, so that it would hear any room, it is stopped once, after a short way, with what to try. Armed again
+after such a way, it drives on, until it touches something.
 
 Later the ring may fail, or freeze: then it hears nothing new. A line of the log says so once that has lasted for
 longer than ever before in this run; a turn counts as well as a way, as it looks at something else. If old echoes came
@@ -23,7 +23,8 @@ from config.bounded import Coordinate
 from drivers.messages import Firing, Odometry, Pose
 
 WAY_MIN_M: Final = 1.0
-"""Way without an echo since the start after which a robot stops whose ring reaches far, m."""
+"""Way without an echo since the start after which a robot stops whose ring reaches far, and after which any is taken
+to be in the open if it is armed again, m."""
 LONGER: Final = 2.0
 LINE_MIN_M: Final = 0.5
 """A way without anything new is worth a line if it is so many times as long as any before, and this long, m: an
@@ -34,9 +35,9 @@ REPEATED_SHARE: Final = 0.5
 """Old echoes are repeated if the last one came after this share of a silence or later: a frozen ring repeats them to
 the end, an honest one hears one again and is silent then."""
 OPEN_M: Final = 4.0
-"""Way and reach together at which a ring that hears nothing stops the robot, m: from the middle of a room 8 m wide it
-has come within reach of a wall by then. In the shipped room a reach of 1.7 m hears its first echo after 1.3 m. After
-the first echo, this is the way without anything new after which it drives slowly: honest rings of 17 robots heard
+"""Way and reach together at which a ring that hears nothing is stopped, m: from the middle of a room 8 m wide it has
+come within reach of a wall by then. In the shipped room a reach of 1.7 m hears its first echo after 1.3 m. After the
+first echo, this is the way without anything new after which it drives slowly: honest rings of 17 robots heard
 something new after 2.0 m at most in rooms, and none drives farther than it can have heard."""
 NOTHING_YET: Final = (
     "no sensor has heard an echo since the start: the robot drives slowly until one does; in the open that is right, "
@@ -47,6 +48,7 @@ _SLOWLY: Final = (
     "once it is halted and re-armed; if anything stands within range, check the ring's power and cables (`echolocate "
     "ring-test --hand`)"
 )
+NOTHING_SO_FAR: Final = f"no sensor has heard an echo since the start, over more than {WAY_MIN_M:g} m: {_SLOWLY}"
 NOTHING_NEW: Final = f"no sensor has heard anything new over the last {OPEN_M:g} m: {_SLOWLY}"
 
 
@@ -102,15 +104,19 @@ class EchoWatch:
 
     def armed(self) -> EchoWatch:
         """Return the watch after the robot was armed, by an operator who has seen where it stands."""
-        return replace(self, is_open=self.is_open or self.slow_reason(OPEN_M) is not None) if self.is_over else self
-
-    def slow_reason(self, reach_m: float) -> str | None:
-        """Return why a robot whose ring reaches so far, m, must drive slowly; None if it need not.
-
-        Before its first echo only a ring that would hear any room is slow: a short one hears it late.
-        """
         if not self.is_over:
-            return NOTHING_YET if reach_m >= OPEN_M - WAY_MIN_M else None
+            return EchoWatch(is_over=True, is_open=True) if self.way_m >= WAY_MIN_M else self
+        return replace(self, is_open=self.is_open or self.slow_reason is not None)
+
+    def touched(self) -> EchoWatch:
+        """Return the watch after a contact: a ring that heard nothing is not known to hear."""
+        return EchoWatch() if self.is_open or not self.is_over else self
+
+    @property
+    def slow_reason(self) -> str | None:
+        """Why the robot must drive slowly; None if it need not."""
+        if not self.is_over:
+            return NOTHING_YET if self.way_m < WAY_MIN_M else NOTHING_SO_FAR
         return self.silence if self._repeats or self.way_m >= OPEN_M else None
 
     @property
@@ -138,11 +144,12 @@ class EchoWatch:
         )
 
     def stopped(self, reach_m: float, problem: str | None = None) -> tuple[EchoWatch, str | None]:
-        """Return the watch, and why a robot whose ring reaches so far must stop; then it is over.
+        """Return the watch, and why a robot whose ring reaches so far, m, must stop; then it is over.
 
-        Another problem comes first.
+        Another problem comes first. A ring of less reach often hears nothing: it does not stop, it drives slowly on.
         """
-        if problem is not None or self.is_over or self.way_m < max(WAY_MIN_M, OPEN_M - reach_m):
+        reaches_far = reach_m >= OPEN_M - WAY_MIN_M
+        if problem is not None or self.is_over or not reaches_far or self.way_m < WAY_MIN_M:
             return self, problem
         return EchoWatch(is_over=True, is_open=True), (
             f"no sensor has heard an echo since the start, over {self.way_m:.1f} m: if anything stands within range, "

@@ -263,6 +263,7 @@ def _decide(state: State, inputs: Inputs, settings: Settings, *, accepts: bool) 
     if stopped or (before.mode is Mode.DRIVE and after.mode is not Mode.DRIVE):
         bumper = bool((inputs.received.flags | state.odometry.flags) & Flags.BUMPER) if state.odometry else False
         state.drive_request = after_stop(state.drive_request, bumper=bumper)
+        state.echo_watch = state.echo_watch.touched() if bumper else state.echo_watch
     if not needs_space(state.drive_request):
         state.goal_drive = None
     return command
@@ -360,8 +361,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings, map_frame: Pose | N
             fired_s = state.clock_monitor.fired_s(inputs.run_s)
             reason, decision = unseen_reason(decision, fired_s, settings.ring), Drive(STANDSTILL)
     if isinstance(decision, Drive):
-        slow_reason = state.echo_watch.slow_reason(settings.ring.range_max_m)
-        twist, slowed = limit_unheard(decision.twist, percept, unheard, settings, slow_reason)
+        twist, slowed = limit_unheard(decision.twist, percept, unheard, settings, state.echo_watch.slow_reason)
         twist, slowed = limit_by_mounting(twist, slowed, odometry.pose, state.perception.ring_monitor, settings)
         if zones is not None:
             commands, age_s = state.motion_monitor.commands, max(0.0, now_s - odometry.robot_s)

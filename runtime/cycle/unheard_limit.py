@@ -72,7 +72,7 @@ def limit_unheard(
     """Return a velocity on the same curve that is slow where it leads to what was lost, and the reason if it is less.
 
     So it is at what is remembered, where a wall goes on that the ring heard before it heard nothing, and everywhere
-    for a reason that `EchoWatch` gives.
+    for a reason that `EchoWatch` gives, which is also given while the robot turns.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def limit_unheard(
         As of `EchoWatch`.
     """
     if abs(twist.v) <= CREEP_M_S:
-        return twist, None
+        return twist, slow_reason if twist.w else None
     if slow_reason is not None or unheard.is_ring_silent:
         limit, reason = CREEP_M_S, slow_reason or LOST
     else:

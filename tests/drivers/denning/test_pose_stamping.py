@@ -128,7 +128,7 @@ def test_late_doubled_and_out_of_window_echoes_go_no_further(measured: Callable[
 
 def test_a_wider_window_counts_from_the_pattern_on_and_a_narrower_one_after_it(harness: DriverHarness) -> None:
     t_us = harness.run(0.4, t_us=0)
-    far = Echo(0, t_us - 5_000, 0, OCTETS[0], (200,) * 8)
+    far = Echo(0, t_us - 5_000, 0, OCTETS[0], tuple(range(200, 208)))
     narrow = CONFIG.ring.model_copy(update={"firing": FiringConfig(preset="octets", window_m=2.0)})
     harness.robot.set_firing(narrow)
     harness.send(far)

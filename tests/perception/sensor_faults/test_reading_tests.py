@@ -47,7 +47,17 @@ def ring() -> Records[RingMemory]:
 
 
 def setup(expected: NDArray[np.bool_]) -> RingSetup:
-    return RingSetup(MOUNTS, np.zeros(COUNT), NEIGHBOURS, expected, HALF, tolerance=0.01, least=0.1, near=3.0)
+    return RingSetup(
+        MOUNTS,
+        np.zeros(COUNT),
+        NEIGHBOURS,
+        expected,
+        HALF,
+        tolerance=0.01,
+        least=0.1,
+        near=3.0,
+        last_step=(6.66, 6.67),
+    )
 
 
 def run_of(memory: Records[SensorMemory], length: int, changes: int, leaps: int) -> None:

@@ -45,6 +45,6 @@ def test_a_neighbour_must_hear_the_same_wall_and_the_robot_must_have_moved(
     memory[1].steady_m = heard_m(float(AXES[1]), neighbour_m)
     memory[2].steady_m = math.inf
     setup = RingSetup(
-        MOUNTS, np.zeros(3), NEIGHBOURS, np.ones(3, np.bool_), HALF, tolerance=0.03, least=0.1, near=3.0
+        MOUNTS, np.zeros(3), NEIGHBOURS, np.ones(3, np.bool_), HALF, 0.03, least=0.1, near=3.0, last_step=(6.65, 6.68)
     )
     assert is_along_wall(0, moved_m, 0.0, 0.0, 0.0, setup, memory) == explains

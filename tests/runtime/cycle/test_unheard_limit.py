@@ -85,7 +85,8 @@ def test_farther_away_it_can_still_stop() -> None:
 def test_before_its_first_echo_a_robot_creeps_and_turns_freely() -> None:
     """A deaf ring and open ground are alike until then."""
     assert limited(Twist(0.3, 0.0), slow_reason=NOTHING_YET) == (Twist(CREEP_M_S, 0.0), NOTHING_YET)
-    assert limited(Twist(0.0, 1.0), slow_reason=NOTHING_YET) == (Twist(0.0, 1.0), None)
+    assert limited(Twist(0.0, 1.0), slow_reason=NOTHING_YET) == (Twist(0.0, 1.0), NOTHING_YET)
+    assert limited(Twist(0.0, 0.0), slow_reason=NOTHING_YET) == (Twist(0.0, 0.0), None)
 
 
 def test_while_the_ring_hears_nothing_it_creeps_everywhere_and_turns_freely() -> None:

@@ -298,7 +298,9 @@ def servo_moment() -> Moment:
         elif taken and len(taken[0].following) < FOLLOWING:
             taken[0].following.append(record)
 
-    simulate(settings, settings.world, 2, (SERVO_CYCLE + FOLLOWING + 1) / settings.cycle.rate_hz, on_state=on_state)
+    within_reach = settings.world.start.model_copy(update={"x_m": 1.2, "y_m": -2.0, "heading_deg": -12.0})
+    world = settings.world.model_copy(update={"start": within_reach})
+    simulate(settings, world, 2, (SERVO_CYCLE + FOLLOWING + 1) / settings.cycle.rate_hz, on_state=on_state)
     return taken[0]
 
 
