@@ -13,6 +13,7 @@ from config.robot import RingConfig, RobotConfig
 from drivers.firing_pattern import FiringError, firing_pattern
 from drivers.latched_ranges import RepeatFilter
 from drivers.messages import CrossPaths, Firing, Floats, Pose
+from runtime.recording.conventions.beams import Beams
 from runtime.recording.conventions.headings import (
     NEAR_NAT,
     SURE,
@@ -127,7 +128,11 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
         value = option_of(not_fired)
         said.append((f"a sensor that did not fire is {value.split()[1]}", f"{value}, or --not-fired empty if not"))
     table = table._replace(ranges=without_not_fired(table.ranges, not_fired))
-    silence = find_silence(table, options.silence, set_size)
+    motion = motion_scores(table, options)
+    likely = next(one for one in motion.scores)
+    if motion.is_related:
+        likely = max(motion.scores, key=motion.scores.__getitem__)
+    silence = find_silence(table, options.silence, set_size, Beams.of(table, robot, likely))
     if silence.words:
         said.append((silence.words, f"--silence {silence.option}, or --silence inf if they are ranges"))
     ranges = _shown(table.ranges, silence)
@@ -138,10 +143,6 @@ def decide(table: Table, robot: RobotConfig, options: RingLogOptions) -> Convent
         table = table._replace(ranges=_without_repeats(table.ranges, repeats.same))
         if options.latched == "auto":
             said.append((repeats.words, "--latched yes, or no if all are fresh"))
-    motion = motion_scores(table, options)
-    likely = next(one for one in motion.scores)
-    if motion.is_related:
-        likely = max(motion.scores, key=motion.scores.__getitem__)
     units, scores = find_units(table, silence, robot, options, likely.unit, _ratios(table, robot, likely))
     given = (options.time_unit, options.length_unit, options.range_unit)
     if _are_unusual(units, given):

@@ -53,8 +53,9 @@ FAR_SHARE: Final = 0.1
 """Share of the ranges that may be such, as glitches."""
 FAR_NAT: Final = 20.0
 """Evidence against units in which all ranges would be such; in proportion where only some are."""
-CEILING_SAME: Final = 0.01
-"""A limit of the ranges is the ring's greatest one if it differs by less, as a share of it."""
+CEILING_SAME: Final = 0.05
+"""A limit of the ranges is the ring's greatest one if it differs by less, as a share of it: noise is some per cent,
+and units differ by more than a factor of two."""
 RESOLUTION_MIN_M: Final = 0.01
 """Finer resolutions of a ring are lost among the file's decimals."""
 MULTIPLES_OFF: Final = 0.1
@@ -221,7 +222,7 @@ class _Facts(NamedTuple):
     echoes: Floats
     """(k,): all ranges that are echoes."""
     ceiling: float | None
-    """The one range that stands for silence, if it is the most that the ring reports; None otherwise."""
+    """The range that stands for silence, if it is the most that the ring reports; None otherwise."""
 
     @staticmethod
     def of(table: Table, silence: Silence, angle: str) -> _Facts:
@@ -237,7 +238,7 @@ class _Facts(NamedTuple):
         speed = float(np.median(moved[rows] / step[rows])) if rows.sum() >= STEPS_MIN else 0.0
         turns = (dt > 0.0) & (turned > 1e-6)
         rate = float(np.median(turned[turns] / step[turns])) if turns.sum() >= STEPS_MIN else 0.0
-        ceiling = silence.low if silence.is_top and silence.low == silence.high else None
+        ceiling = silence.centre if silence.is_top else None
         return _Facts(period, speed, rate, table.ranges[np.isfinite(table.ranges)], ceiling)
 
 

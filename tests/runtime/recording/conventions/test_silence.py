@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from drivers.messages import Floats
+from runtime.recording.conventions.beams import Beams
 from runtime.recording.conventions.silence import find_silence
 from runtime.recording.conventions.table import Table
 from runtime.recording.ring_log import RingLogError
 
 ROWS, SENSORS = 600, 4
+
+
+def ahead(count: int = ROWS, bearings: tuple[float, ...] = (0.0, 0.7, 1.6, 2.5)) -> Beams:
+    """Return beams at angles to the way, rad."""
+    return Beams(np.tile(bearings, (count, 1)), np.full(len(bearings), 0.2), np.zeros(len(bearings)), 0.2, 5.0)
 
 
 def table(silent: Floats, share: float = 0.3) -> tuple[Table, NDArray[np.bool_]]:
@@ -42,7 +50,7 @@ NOISY = np.round(7.6 + 0.05 * np.random.default_rng(2).standard_normal(1000), 3)
 )
 def test_what_is_said_is_silence(wanted: str, silent: Floats) -> None:
     rows, is_silent = table(np.array(silent))
-    got = find_silence(rows, wanted, 1).applied(rows.ranges)
+    got = find_silence(rows, wanted, 1, ahead()).applied(rows.ranges)
     assert (np.isposinf(got) == is_silent).mean() > 0.999
     np.testing.assert_array_equal(got[~is_silent], rows.ranges[~is_silent])
 
@@ -50,13 +58,13 @@ def test_what_is_said_is_silence(wanted: str, silent: Floats) -> None:
 def test_of_few_ranges_the_greatest_is_silence_where_that_is_said() -> None:
     rows, _ = table(np.array([7.6]), 0.0)
     few = rows._replace(t=rows.t[:2], pose=rows.pose[:2], ranges=np.array([[1.0, np.nan], [np.nan, 2.0]]))
-    assert find_silence(few, "max", 1).applied(few.ranges)[1, 1] == np.inf
+    assert find_silence(few, "max", 1, ahead(2)).applied(few.ranges)[1, 1] == np.inf
 
 
 def test_a_number_is_exact_and_leaves_glitches_above_it() -> None:
     rows, _ = table(np.array([7.6]))
     rows.ranges[5, 0] = 34.0
-    assert find_silence(rows, "7.6", 1).applied(rows.ranges)[5, 0] == 34.0
+    assert find_silence(rows, "7.6", 1, ahead()).applied(rows.ranges)[5, 0] == 34.0
 
 
 @pytest.mark.parametrize(
@@ -66,14 +74,14 @@ def test_silence_is_found_in_ranges_without_inf(silent: Floats, share: float) ->
     rows, is_silent = table(np.array(silent), share)
     smooth = 2.0 + np.sin(0.01 * np.arange(ROWS))[:, None] + np.zeros(SENSORS)
     rows.ranges[~is_silent] = smooth[~is_silent]
-    found = find_silence(rows, "auto", 1)
+    found = find_silence(rows, "auto", 1, ahead())
     assert found.words
     assert (np.isposinf(found.applied(rows.ranges)) == is_silent).mean() > 0.99
 
 
 def test_no_silence_is_found_where_each_sensor_hears_something() -> None:
     rows, _ = table(np.array([1.0]), 0.0)
-    assert not find_silence(rows, "auto", 1).words
+    assert not find_silence(rows, "auto", 1, ahead()).words
 
 
 @pytest.mark.parametrize("wanted", ["auto", "max"])
@@ -82,7 +90,7 @@ def test_a_noisy_band_among_ranges_takes_few_of_them(wanted: str) -> None:
     rows, is_silent = table(NOISY, 0.4)
     rng = np.random.default_rng(3)
     rows.ranges[~is_silent] = rng.uniform(4.0, 7.75, int((~is_silent).sum()))
-    got = np.isposinf(find_silence(rows, wanted, 1).applied(rows.ranges))
+    got = np.isposinf(find_silence(rows, wanted, 1, ahead()).applied(rows.ranges))
     away = np.abs(rows.ranges - 7.6)
     least = min(int(((away <= half) != is_silent).sum()) for half in np.linspace(0.01, 0.3, 30))
     assert (got != is_silent).sum() < 1.15 * least
@@ -96,7 +104,7 @@ def test_a_ceiling_with_noise_and_glitches_above_it_is_found(spread: float) -> N
     ceiling[:30] = np.round(rng.uniform(9.0, 30.0, 30), 2)
     rows, is_silent = table(rng.permutation(ceiling), 0.6)
     rows.ranges[:] = np.round(rows.ranges, 2)
-    found = find_silence(rows, "auto", 1)
+    found = find_silence(rows, "auto", 1, ahead())
     got, is_glitch = np.isposinf(found.applied(rows.ranges)), rows.ranges > 9.0
     assert found.option == "max"
     assert got[is_silent & ~is_glitch].mean() > 0.995
@@ -106,10 +114,10 @@ def test_a_ceiling_with_noise_and_glitches_above_it_is_found(spread: float) -> N
 def test_glitches_of_zero_below_a_ceiling_are_refused_with_the_options_that_keep_both_apart() -> None:
     rows, _ = table(np.concatenate([NOISY, np.zeros(40)]), 0.6)
     with pytest.raises(RingLogError, match=r"are 0, and .*: say --silence max --not-fired 0 if 0 is no reading"):
-        find_silence(rows, "auto", 1)
-    assert find_silence(rows, "0", 1).applied(rows.ranges).max() == np.inf
+        find_silence(rows, "auto", 1, ahead())
+    assert find_silence(rows, "0", 1, ahead()).applied(rows.ranges).max() == np.inf
     few, _ = table(np.concatenate([NOISY[:300], np.zeros(700)]), 0.6)
-    assert find_silence(few, "auto", 1).option == "0", "more than those at the top"
+    assert find_silence(few, "auto", 1, ahead()).option == "0", "more than those at the top"
 
 
 def test_a_ceiling_with_more_noise_than_surfaces_have_is_refused_with_the_option() -> None:
@@ -119,11 +127,11 @@ def test_a_ceiling_with_more_noise_than_surfaces_have_is_refused_with_the_option
     with pytest.raises(
         RingLogError, match="say --silence max if that is no echo, or --silence inf if they are ranges"
     ):
-        find_silence(rows, "auto", 1)
-    assert (np.isposinf(find_silence(rows, "max", 1).applied(rows.ranges)) == is_silent).mean() > 0.99
+        find_silence(rows, "auto", 1, ahead())
+    assert (np.isposinf(find_silence(rows, "max", 1, ahead()).applied(rows.ranges)) == is_silent).mean() > 0.99
 
 
-@pytest.mark.parametrize("sway_m", [0.03, 0.05])
+@pytest.mark.parametrize("sway_m", [0.0, 0.03, 0.05])
 @pytest.mark.parametrize("repeated", [1, 4])
 def test_a_wall_along_which_the_robot_sways_is_no_silence(sway_m: float, repeated: int) -> None:
     """The far wall of a corridor is at the top of all ranges, too, and was taken for silence or refused."""
@@ -131,4 +139,5 @@ def test_a_wall_along_which_the_robot_sways_is_no_silence(sway_m: float, repeate
     sways = sway_m * np.sin(rows.t[::repeated])
     sides = np.column_stack([2.15 + sways, 0.55 - sways, 2.15 + sways, 0.55 - sways])
     sides = np.repeat(sides + 0.01 * rng.standard_normal(sides.shape), repeated, axis=0)
-    assert find_silence(rows._replace(ranges=np.round(sides, 3)), "auto", 1).option == "inf"
+    beams = ahead(bearings=(math.pi / 2, -math.pi / 2, math.pi / 2, -math.pi / 2))
+    assert find_silence(rows._replace(ranges=np.round(sides, 3)), "auto", 1, beams).option == "inf"

@@ -1,0 +1,47 @@
+"""Noisy silence is a band at the top of the ranges, also where its noise is cut off."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from runtime.recording.conventions.ceilings import cut_off, find_band
+from tests.runtime.recording.conventions.silence_tables import KINDS, outcome, silence_table
+
+
+@pytest.mark.parametrize("above", [-1.0, 0.0, 0.5])
+def test_noise_that_is_cut_off_at_the_greatest_value_is_measured(above: float) -> None:
+    """`above` is the true mean over the greatest value, in standard deviations."""
+    rng = np.random.default_rng(1)
+    silent = np.minimum(5.0 + 0.05 * (above + rng.standard_normal(4000)), 5.0)
+    found = cut_off(np.concatenate([silent, rng.uniform(4.4, 5.0, 300)]))
+    assert found == pytest.approx((5.0 + 0.05 * above, 0.05), abs=0.006)
+
+
+def test_one_exact_value_among_ranges_has_no_noise() -> None:
+    rng = np.random.default_rng(2)
+    assert cut_off(np.concatenate([np.full(900, 5.0), rng.uniform(4.4, 5.0, 300)])) is None
+    assert cut_off(np.full(900, 5.0)) is None
+
+
+def test_a_rare_band_is_found_beside_ranges() -> None:
+    rng = np.random.default_rng(3)
+    found = find_band(np.concatenate([rng.uniform(0.3, 4.4, 2000), 4.9 + 0.05 * rng.standard_normal(90)]), 0.03)
+    assert found is not None
+    assert (found.centre, found.spread) == pytest.approx((4.9, 0.05), abs=0.02)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_silence_that_is_hard_to_see_is_never_wrong_without_a_word(kind: str) -> None:
+    found = [outcome(silence_table(kind, seed)) for seed in (0, 1)]
+    assert all(word != "wrong" for word, _ in found), found
+
+
+@pytest.mark.soak
+def test_many_tables_whose_silence_is_hard_to_see() -> None:
+    """Of walls in a corridor and rooms of echoes alone, none is refused for its silence."""
+    found = Counter((kind, outcome(silence_table(kind, seed))[0]) for kind in KINDS for seed in range(1000, 1040))
+    assert sum(found[kind, "wrong"] for kind in KINDS) <= 6, found
+    assert sum(found[kind, "refused"] for kind in KINDS) <= 12, found
