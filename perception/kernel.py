@@ -46,7 +46,8 @@ def kernel(function: F) -> F:
 def entry_kernel(function: F) -> F:
     """Compile `function` as `kernel` does, for one that Python calls with each firing.
 
-    Only its first call looks at what types its arguments have; the type checker sees to it that they stay the same.
+    Only its first call looks at what types its arguments have. Later ones must have the same, and arrays whose items
+    follow each other: a column of a table would be read wrongly.
     """
     return function if INTERPRETED else cast("F", EntryDispatcher(function, **BORROWING))
 

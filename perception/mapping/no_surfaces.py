@@ -18,16 +18,15 @@ class SurfaceReport(NamedTuple):
 
     walls: tuple[DetectedObject, ...] = ()
     polylines: tuple[Polyline, ...] = ()
-    stands_for_walls: bool = False
-    """Whether the method's own walls are not shown, as its shapes explain little of this place."""
     refuted: frozenset[int] = frozenset()
     """Numbers of round objects of the method that are not shown: the pieces at their places are straight."""
+    replaced: frozenset[int] = frozenset()
+    """Numbers of the method's walls that are not shown: pieces stand along them."""
 
     def shown(self, objects: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
-        """Return the method's objects without those for which the surfaces stand, or which they refute."""
-        if not self.stands_for_walls:
-            return objects
-        return tuple(one for one in objects if one.ends is None and one.number not in self.refuted)
+        """Return the method's objects without those that the surfaces refute or replace."""
+        hidden = self.refuted | self.replaced
+        return tuple(one for one in objects if one.number not in hidden) if hidden else objects
 
 
 class NoSurfaces:

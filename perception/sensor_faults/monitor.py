@@ -131,7 +131,6 @@ class SensorMonitor:
         _tolerance=CONSTANT,
         _least=CONSTANT,
         _near=CONSTANT,
-        _last_step=CONSTANT,
         _sensors=SensorMemory.BOUNDS,
         _ring=RingMemory.BOUNDS,
         _sets=FLAG,
@@ -178,6 +177,9 @@ class SensorMonitor:
         Doubtful readings are not mapped, but the robot keeps clear of them. Other readings are NaN, as if the sensor
         had not fired.
         """
+        ranges_m = np.ascontiguousarray(firing.ranges_m, np.float64)  # kernels look at their types no more
+        if ranges_m is not firing.ranges_m:
+            firing = replace(firing, ranges_m=ranges_m)
         pose, trusted, possible = firing.pose, self._trusted, self._possible
         if self._turning:
             self._turns[self._turning] = pose.theta - firing.ring_yaw

@@ -42,8 +42,8 @@ def test_numbers_are_found_with_their_other_values() -> None:
 def test_only_kernels_that_depend_on_a_number_change() -> None:
     shipped, (varied, other, same) = kernel_digests(), varied_digests()
     assert (other, same) == (8, sight_lines.LOCATED_RAD) != (sight_lines.RAYS, sight_lines.LOCATED_RAD)
-    assert shipped.keys() == varied.keys()
-    changed = {name for name in shipped if shipped[name] != varied[name]}
+    assert varied.keys() <= shipped.keys(), "here other tests have imported more"
+    changed = {name for name in varied if shipped[name] != varied[name]}
     assert {name.rpartition(".")[0] for name in changed} == {"perception.mapping.grid.sight_lines"}
 
 

@@ -45,11 +45,10 @@ def test_the_corridors_walls_are_straight_lines(side: int) -> None:
 def test_the_corridors_reported_walls_lie_along_its_sides() -> None:
     """The sensors that look square at a side heard each wall; none lies across, from the echoes of one edge.
 
-    How much of the sides is reported changes with half a millimetre of a pose (by .12 and .17 from drive to drive),
-    so it is a mean: .79 and .20 in 56 drives, and .9 of both is asked.
+    How much of the sides is reported changes with half a millimetre of a pose, so it is a mean: .90 and .40 in 20
+    drives, and .9 of both is asked. In one of the 20 an edge's echoes are a wall across.
     """
-    shares = np.mean([corridor_shares(seed) for seed in range(5)], axis=0)
-    assert (shares > (0.6, 0.05)).all()
+    assert (np.mean([corridor_shares(seed) for seed in range(5)], axis=0) > (0.75, 0.25)).all()
 
 
 def corridor_shares(seed: int) -> tuple[float, ...]:

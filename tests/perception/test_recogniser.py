@@ -30,7 +30,7 @@ def test_arrays_give_what_the_pipeline_gives(method: str) -> None:
         while perception.can_refine:
             perception.refine()
     half = len(FIRINGS) // 2
-    recogniser.add(POSES[:half], RANGES[:half], TIMES[:half], YAWS[:half])
+    recogniser.add(POSES[:half], np.asfortranarray(RANGES[:half]), TIMES[:half], YAWS[:half])
     recogniser.add(POSES[half:].tolist(), RANGES[half:].tolist(), TIMES[half:].tolist())  # the ring looks ahead
     assert recogniser.perception.counts == perception.counts
     assert recogniser.perception.counts.segments_total > 0

@@ -48,7 +48,7 @@ from perception.records import Structured
 SAME_TURN_RAD: Final = 0.14
 """Greatest angle between two parts of a wall."""
 SAME_WITHIN_M: Final = 1.0
-"""Distance from the other's spans within which they are compared."""
+"""Distance from the other's spans within which their agreement counts: farther away lines of any wall come near."""
 SAME_SLACK_M: Final = 0.025
 """Greatest distance between two walls that are one, beyond `SAME_SIGMAS`."""
 SAME_SHARE: Final = 2
@@ -56,7 +56,7 @@ SAME_SHARE: Final = 2
 EXPLAINED_SHARE: Final = 0.6
 """A wall ends when others explain this share of its bins, or fewer than `FLAT_BINS_MIN` are its own."""
 MERGED_MISFIT_MAX: Final = 3.0
-"""Greatest χ² of a wall for each degree of freedom."""
+"""Greatest χ² of a wall for each degree of freedom; also of one that is reported."""
 EDGE_BINS: Final = 24
 """A frame moves when readings come so near its first or its last bin."""
 FRAME_TURN_MAX: Final = 0.02
@@ -81,14 +81,12 @@ def are_one(main: Wall, part: Wall) -> bool:
         dx = part.origin_x + part.normal_x * off - part.normal_y * u - main.origin_x
         dy = part.origin_y + part.normal_y * off + part.normal_x * u - main.origin_y
         along = main.normal_x * dy - main.normal_y * dx
-        if not is_on_span(main, along, SAME_WITHIN_M):
-            continue
         away = abs(main.offset + main.slope * along - main.normal_x * dx - main.normal_y * dy)
         sigma = math.sqrt(line_variance(main, along) + line_variance(part, u))
-        if away < SAME_SIGMAS * sigma + SAME_SLACK_M:
-            same += 1
-        else:
+        if away >= SAME_SIGMAS * sigma + SAME_SLACK_M:
             other += 1
+        elif is_on_span(main, along, SAME_WITHIN_M):
+            same += 1
     return same > SAME_SHARE * other
 
 

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from perception.bayes.inference.cross_path import LENGTH_MIN_M
 from perception.bayes.memory.state import ESTABLISHED, Memory
 from perception.bayes.memory.wall_records import MAX_WALLS
-from perception.bayes.walls.contact import EDGES_LEAD, EDGES_SHARE, FIRM_WEIGHT, MIRRORS_SILENCES
-from perception.bayes.walls.evidence import LINE_MISFIT_MAX, SPAN_CHI2_MIN, SURE_SPAN_WEIGHT, WALL_MIN_M
+from perception.bayes.walls.contact import EDGES_LEAD, EDGES_SHARE, MIRRORS_SILENCES
+from perception.bayes.walls.evidence import SPAN_CHI2_MIN, SURE_SPAN_WEIGHT, WALL_MIN_M
 from perception.bayes.walls.fit import WALL_WEIGHT_MIN
+from perception.bayes.walls.merging import MERGED_MISFIT_MAX
 from perception.bayes.walls.numbers import SPAN_MIN_M
 from perception.bayes.walls.reported_points import EVIDENCE_MAX_NAT, end_at_edges, reach_corners
 from perception.bayes.walls.straight import Straight, kept_bins, straight, straighten
@@ -26,9 +27,6 @@ stands, thousands of their tangents are tried. With 14 for the others, not a met
 false walls across a real corridor."""
 HEAVIEST_SPAN_MIN: Final = 12.0
 """Least weight of the first wall's heaviest span."""
-LIGHT_MISFIT_MAX: Final = 2.0
-"""Greatest χ² for each degree of freedom of a line of less weight than `FIRM_WEIGHT`: it may be the side of a barrel
-that was heard from a few places."""
 TOGETHER_WEIGHT_MIN: Final = 5.0
 """Weight of two spans, at least, that are evidence together."""
 PRIOR_NAT: Final = -2.0
@@ -145,7 +143,7 @@ def _segments(of: Straight) -> Iterator[tuple[float, ...]]:
     for (low, high), weight, chi2, number in zip(*columns, strict=True):
         middle = 0.5 * (low + high)
         across = variance + 2.0 * middle * covariance + middle * middle * variance_turn
-        evidence = min(EVIDENCE_MAX_NAT, 0.5 * max(of.wall["chi2"], chi2))
+        evidence = min(EVIDENCE_MAX_NAT, 0.5 * max(of.wall["chi2"], chi2) / max(1.0, of.wall["misfit"]))
         yield (*of.point(low), *of.point(high), across, variance_turn, weight, PRIOR_NAT + evidence, number)
 
 
@@ -160,8 +158,8 @@ def sure_walls(walls: Structured, corners: Structured) -> dict[int, Straight]:
         All corners.
     """
     found: dict[int, Straight] = {}
-    misfit_max = np.where(walls["weight"] < FIRM_WEIGHT, LIGHT_MISFIT_MAX, LINE_MISFIT_MAX)
-    fitting = np.flatnonzero((walls["weight"] > 0.0) & (walls["misfit"] < misfit_max)).tolist()
+    fitting = np.flatnonzero((walls["weight"] > 0.0) & (walls["misfit"] < MERGED_MISFIT_MAX)).tolist()
+    misfits = np.maximum(1.0, walls["misfit"])
     heard = corners[(corners["is_used"] == 1) & (corners["echoes"] >= PROOF_ECHOES) & (corners["is_edge"] == 0)]
     heard = heard[heard["echoes"] > PROOF_LEAD * heard["passes"]]
     pairs = np.column_stack([heard["first"], heard["second"]])
@@ -169,14 +167,15 @@ def sure_walls(walls: Structured, corners: Structured) -> dict[int, Straight]:
     is_span = np.arange(spans.shape[1]) < walls["span_count"][fitting, None]
     is_long = is_span & (spans["high"] - spans["low"] >= WALL_MIN_M) & (spans["weight"] >= HEAVIEST_SPAN_MIN)
     kept = kept_bins(walls["bins"])
-    if not ((spans["chi2"][is_long] >= WALL_CHI2_MIN).any() or kept.any()):
+    evidence = spans["chi2"] / misfits[fitting, None]
+    if not ((evidence[is_long] >= WALL_CHI2_MIN).any() or kept.any()):
         return found
     for is_neighbour in (False, True):
         proven = {int(b if a in found else a) for a, b in pairs if (a in found) != (b in found)}
         for number in fitting if not is_neighbour else sorted(proven.intersection(fitting)):
             wall = walls[number]
             spans = wall["spans"][: wall["span_count"]].copy()
-            is_sure = sure_spans(spans, wall["chi2"], is_neighbour)
+            is_sure = sure_spans(spans, wall["chi2"], misfits[number], is_neighbour)
             if kept[number].any():
                 is_sure |= kept_spans(spans, kept[number], wall["bins"]["number"])
             spans = spans[is_sure]
@@ -185,7 +184,7 @@ def sure_walls(walls: Structured, corners: Structured) -> dict[int, Straight]:
     return found
 
 
-def sure_spans(spans: Structured, chi2: float, is_proven: bool) -> NDArray[np.bool_]:
+def sure_spans(spans: Structured, chi2: float, misfit: float, is_proven: bool) -> NDArray[np.bool_]:
     """Return which spans of a wall can be reported: none unless it is a wall, by its best span or by all together.
 
     Parameters
@@ -194,15 +193,18 @@ def sure_spans(spans: Structured, chi2: float, is_proven: bool) -> NDArray[np.bo
         All spans of the wall.
     chi2 : float
         Evidence of all together.
+    misfit : float
+        χ² of the wall's line for each degree of freedom, at least 1: the evidence is divided by it, as echoes that
+        scatter more than the noise say less.
     is_proven : bool
         Whether a corner proves that it is a wall.
     """
-    length, weight, straight = spans["high"] - spans["low"], spans["weight"], spans["chi2"]
+    length, weight, straight = spans["high"] - spans["low"], spans["weight"], spans["chi2"] / misfit
     least = SURE_SPAN_WEIGHT if is_proven else WALL_WEIGHT_MIN
-    heavy = (weight >= least) & (straight > SPAN_CHI2_MIN)
+    heavy = (weight >= least) & (spans["chi2"] > SPAN_CHI2_MIN)
     sure = heavy & (length >= SPAN_MIN_M)
     if sure.any() and not is_proven:
-        together = chi2 if np.count_nonzero(heavy & (weight >= TOGETHER_WEIGHT_MIN)) > 1 else -np.inf
+        together = chi2 / misfit if np.count_nonzero(heavy & (weight >= TOGETHER_WEIGHT_MIN)) > 1 else -np.inf
         sure &= bool(max(straight[sure].max(), together) >= WALL_CHI2_MIN and length[sure].max() >= WALL_MIN_M)
     return np.asarray(sure)
 

@@ -1,7 +1,8 @@
 """What is reported of the map of surfaces: walls beside the method's own or in their place, and polylines.
 
 Whether a straight piece is a wall depends on the place: where the shapes of the method explain what is heard, the
-rest is not made of walls; where they explain little, the pieces are the walls, and the method's own are not shown.
+rest is not made of walls; where they explain little, the pieces are the walls, and the method's own are shown where
+no piece lies along them.
 """
 
 from __future__ import annotations
@@ -49,6 +50,8 @@ STRAIGHT_M: Final = 1.0
 """Length of the straight pieces for whose evidence walls are expected at all."""
 STRAIGHT_NAT: Final = 15.0
 """The most that one straight piece says for itself: its echoes repeat one another."""
+WALLED_PLACE_NAT: Final = 2.0 * STRAIGHT_NAT
+"""Evidence of straight pieces that shows a place of walls: an edge's echoes across a real corridor had 14 nat."""
 EVIDENCE_MAX: Final = 30.0
 """Greatest log odds that are reported, nat."""
 PROBABILITY_MIN: Final = 1e-300
@@ -125,13 +128,13 @@ def beside_known(rows: Structured, near: NDArray[np.int64], prior: float) -> Sur
         for begin, end in runs
         if (end - begin) * length_m >= PIECE_KEPT_M
     ]
-    rest = rows[~is_wall & free.any(axis=1)]
+    rest = rows[~is_wall & (near < ALONG).any(axis=1)]  # an unknown object hides no outline
     if prior > 0.0:
         # Where shapes explain little, what is on a post or barrel is no wall, but an outline: no result has the body.
         on_body = near == ON_BODY
         rest = rows[~is_wall & (free | on_body).any(axis=1)]
         rest = np.concatenate([rest, _cut(straight, on_body[is_wall])])
-    return SurfaceReport(tuple(found), tuple(_polylines(rest)), prior > 0.0)
+    return SurfaceReport(tuple(found), tuple(_polylines(rest)))
 
 
 def lengths(rows: Structured) -> Floats:
@@ -156,7 +159,7 @@ def wall_prior(rows: Structured, near: NDArray[np.int64]) -> float:
     # Where nothing but round bodies stands, each has short straight pieces: long ones show that there are walls,
     # those that the method knows as walls, too.
     is_long = (length >= STRAIGHT_M) & ((near >= AWAY) & (near < ON_BODY)).all(axis=1)
-    straight_share = min(float(rows["evidence"][is_long].clip(0.0).sum()) / STRAIGHT_NAT, 1.0)
+    straight_share = min(float(rows["evidence"][is_long].clip(0.0).sum()) / WALLED_PLACE_NAT, 1.0)
     return KNOWN_NAT * (straight_share * (1.0 - known_share) / (1.0 - KNOWN_SHARE) - 1.0)
 
 
@@ -188,6 +191,29 @@ def refuted(
         if math.log(max(odds, PROBABILITY_MIN)) - straight < STRAIGHT_NAT:
             gone.add(one.number)
     return frozenset(gone)
+
+
+def replaced(walls: tuple[DetectedObject, ...], known: tuple[DetectedObject, ...]) -> frozenset[int]:
+    """Return the numbers of the method's walls along half of which, at least, pieces stand as walls.
+
+    Parameters
+    ----------
+    walls : tuple of DetectedObject
+        The pieces that are reported as walls, where they stand for the method's.
+    known
+        As for `nearness`.
+    """
+    own = [(one.number, one.ends) for one in known if one.ends is not None and one.number is not None]
+    if not walls or not own:
+        return frozenset()
+    lines = np.array([ends for _, ends in own])
+    shares = ((np.arange(PLACES) + 0.5) / PLACES)[:, None]
+    places = (lines[:, None, :2] + shares * (lines[:, None, 2:] - lines[:, None, :2])).reshape(-1, 2)
+    marks = np.zeros(len(places), np.int64)
+    ends = np.array([one.ends for one in walls])
+    find_near(places, ends, np.full(len(ends), AGREES_M), marks)
+    is_along = marks.reshape(-1, PLACES).mean(axis=1) >= 0.5
+    return frozenset(number for (number, _), is_gone in zip(own, is_along.tolist(), strict=True) if is_gone)
 
 
 def _cut(rows: Structured, of: NDArray[np.bool_]) -> Structured:

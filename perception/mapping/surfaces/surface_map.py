@@ -23,7 +23,7 @@ from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 from perception.map_moves import MapMoves
 from perception.mapping.no_surfaces import NoSurfaces, SurfaceReport
-from perception.mapping.surfaces.beside_known import RIVALS_M, beside_known, nearness, refuted, wall_prior
+from perception.mapping.surfaces.beside_known import RIVALS_M, beside_known, nearness, refuted, replaced, wall_prior
 from perception.mapping.surfaces.local_map import LocalMapSearch
 from perception.mapping.surfaces.parameters import CELL_M, CELLS, PIECE_KEPT_M
 from perception.mapping.surfaces.surface_list import Surface, SurfaceList
@@ -180,6 +180,9 @@ class SurfaceMap(NoSurfaces):
             if self._report is None or gone != self._report.refuted or not np.array_equal(near, self._near):
                 self._near, self._report = near, beside_known(rows, near, prior)._replace(refuted=gone)
                 self._archived = None
+            along = replaced(self._report.walls, objects) if prior > 0.0 else frozenset[int]()
+            if along != self._report.replaced:
+                self._report, self._archived = self._report._replace(replaced=along), None
             self._known = objects
         return self._report
 

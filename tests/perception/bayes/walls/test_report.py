@@ -70,12 +70,11 @@ def test_short_light_and_bent_lines_are_no_walls() -> None:
     free(wall)
     place_wall(wall, np.zeros(2), 0.0, 2.0)
     fill(memory, wall, -0.6, 0.6)
-    wall.misfit = 2.6
+    wall.misfit = 3.1
     assert len(wall_ends(memory)) == 0
-    wall.misfit = 2.4
-    assert len(wall_ends(memory)) == 1
-    wall.weight = 19.0
-    assert len(wall_ends(memory)) == 0, "a barrel's side"
+    for evidence, is_wall in ((90.0, True), (79.0, False)):  # 40 are needed
+        wall.misfit, wall.chi2, wall.spans[0].chi2 = 2.0, evidence, evidence
+        assert len(wall_ends(memory)) == is_wall, "what scatters twice as much as noise needs twice the evidence"
 
 
 def test_a_line_through_a_named_drum_is_no_wall() -> None:

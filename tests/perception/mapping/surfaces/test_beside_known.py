@@ -9,7 +9,7 @@ import pytest
 
 from perception.detected_object import DetectedObject, wall_between
 from perception.mapping.no_surfaces import SurfaceReport
-from perception.mapping.surfaces.beside_known import beside_known, nearness, refuted, wall_prior
+from perception.mapping.surfaces.beside_known import beside_known, nearness, refuted, replaced, wall_prior
 from perception.mapping.surfaces.surface_list import ENDS, Surface
 from perception.records import Structured, zeros
 
@@ -32,8 +32,8 @@ def room(height: float = 6.0) -> Structured:
     return pieces(*[(*a, *b) for a, b in itertools.pairwise(corners)])
 
 
-def known_wall(x1: float, y1: float, x2: float, y2: float) -> DetectedObject:
-    return wall_between((x1, y1, x2, y2), 1e-6, 1e-6, 50, 9.0, 7)
+def known_wall(x1: float, y1: float, x2: float, y2: float, number: int = 7) -> DetectedObject:
+    return wall_between((x1, y1, x2, y2), 1e-6, 1e-6, 50, 9.0, number)
 
 
 def report(
@@ -60,7 +60,6 @@ def test_where_little_is_known_pieces_stand_for_the_walls() -> None:
     drum = DetectedObject("drum", 8.0, 3.0, 0.0, 0.01, 9, 1.0)
     found = report(room(), (known_wall(0.0, 0.03, 4.0, 0.03), drum), {"drum": 0.3})
     ends = np.array([w.ends for w in found.walls])
-    assert found.stands_for_walls
     assert ((ends[:, 1] == 0.0) & (ends[:, 0] == 0.0) & (ends[:, 2] == 8.0)).any()
     beside = ends[(ends[:, 0] == 8.0) & (ends[:, 2] == 8.0)]
     assert len(beside) == 2
@@ -83,11 +82,22 @@ def test_where_little_is_known_a_post_hides_no_outline() -> None:
 
 
 @pytest.mark.parametrize("known", range(5))
-def test_the_method_s_walls_are_shown_once_it_knows_most(known: int) -> None:
-    """Four walls are known one after the other: from some share on the method's own are shown, and nothing beside."""
+def test_nothing_stands_along_the_method_s_walls_once_it_knows_most(known: int) -> None:
+    """Four walls are known one after the other: from some share on the method's own stand alone."""
     rows = room()
     found = report(rows, tuple(known_wall(*row) for row in zip(*(rows[name][:known] for name in ENDS), strict=True)))
-    assert (len(found.walls), found.stands_for_walls) == ((4, True) if known < 3 else (0, False))
+    assert len(found.walls) == (4 if known < 3 else 0)
+
+
+def test_a_wall_is_shown_where_no_piece_stands_along_it() -> None:
+    """By half of its length, within the distance at which a surface explains an echo; not by its line."""
+    found = report(room()).walls
+    lines = [(0.0, 0.05, 8.0, 0.05), (0.0, 0.05, 20.0, 0.05), (0.0, 0.3, 8.0, 0.3), (10.0, 0.0, 12.0, 0.0)]
+    own = tuple(known_wall(*line, 11 + k) for k, line in enumerate(lines))
+    assert replaced(found, own) == {11}
+    assert replaced((), own) == replaced(found, ()) == frozenset()
+    shown = SurfaceReport(found, replaced=frozenset({11}), refuted=frozenset({13})).shown(own)
+    assert [one.number for one in shown] == [12, 14]
 
 
 def test_what_is_left_of_the_echoes_of_known_walls_is_no_wall() -> None:
@@ -130,7 +140,7 @@ def test_pieces_of_round_bodies_alone_are_no_walls(radius: float) -> None:
     assert len(polylines) > 100
 
 
-def test_a_piece_on_an_unknown_object_is_no_wall_where_the_method_explains_the_place() -> None:
+def test_a_piece_on_an_unknown_object_is_an_outline_where_the_method_explains_the_place() -> None:
     """It may be as large as the largest body. It is not known, so that it says nothing of the place."""
     known = tuple(known_wall(*row) for row in zip(*(room()[name] for name in ENDS), strict=True))
     rows = np.concatenate([room(), pieces((3.0, 3.0, 4.2, 3.0), evidence=100.0)])

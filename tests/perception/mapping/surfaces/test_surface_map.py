@@ -129,10 +129,10 @@ def test_a_report_changes_only_with_what_is_free(driven: Perception) -> None:
 
 
 def test_pieces_stand_for_the_walls_of_a_place_that_is_not_known(driven: Perception) -> None:
-    """The method's walls are not shown, near the robot and left behind; its other objects are."""
+    """The method's walls along them are not shown, near the robot and left behind; its other objects are."""
     surfaces = driven.surfaces
     assert isinstance(surfaces, SurfaceMap)
-    wall = wall_between((-3.0, -2.0, 3.0, -2.0), 1e-4, 1e-4, 50, 9.0)
+    wall = wall_between((-3.0, -2.0, 3.0, -2.0), 1e-4, 1e-4, 50, 9.0, 5)
     post = DetectedObject("post", 1.0, 1.0, 0.0, 0.01, 9, 1.0)
     report = surfaces.report(lambda: (wall, post))
     assert report.walls
