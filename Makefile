@@ -77,8 +77,8 @@ coverage: $(VENV)/test.stamp
 	$(BIN)/python -m slipcover --merge $(LINES)/*.json --out $(VENV)/lines.json --skip-covered --fail-under 95
 
 # Drives and damaged states with array bounds checked, which compiled code does not do by default. Each kernel is compiled
-# for it and called little, so it is optimised less. Kernels of the emulator, of places and of grids are checked so by
-# `make soak`, and by `make interpreted`: Python checks indices, too.
+# for it and called little, so it is optimised less. Kernels of places and grids are checked so by `make soak` alone,
+# those of the emulator by `make interpreted`, too: Python checks indices.
 boundscheck: $(VENV)/test.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 $(PYTEST) $(BOUNDSCHECKED) -m "boundscheck and not soak"
 

@@ -2,7 +2,7 @@
 
 Whether a straight piece is a wall depends on the place: where the shapes of the method explain what is heard, the
 rest is not made of walls; where they explain little, the pieces are the walls, and the method's own are shown where
-no piece lies along them.
+pieces lie along less than half of them.
 """
 
 from __future__ import annotations
