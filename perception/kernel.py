@@ -27,10 +27,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def _compiled(function: F, **options: object) -> F:
+def _compiled(function: F, dispatcher: type[KernelDispatcher] = KernelDispatcher, /, **options: object) -> F:
     if INTERPRETED:
         return function
-    return cast("F", KernelDispatcher(function, **options))
+    return cast("F", dispatcher(function, **options))
 
 
 def kernel(function: F) -> F:
@@ -49,7 +49,7 @@ def entry_kernel(function: F) -> F:
     Only its first call looks at what types its arguments have. Later ones must have the same, and arrays whose items
     follow each other: a column of a table would be read wrongly.
     """
-    return function if INTERPRETED else cast("F", EntryDispatcher(function, **BORROWING))
+    return _compiled(function, EntryDispatcher, **BORROWING)
 
 
 def loop_kernel(function: F) -> F:

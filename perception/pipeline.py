@@ -122,7 +122,7 @@ class Perception:
     @property
     def can_refine(self) -> bool:
         """Whether `refine` has anything to improve now."""
-        return any(one.can_refine for one in self._refined()) or self.canyon_map.is_due
+        return self.method.can_refine or self.canyon_map.is_due or any(one.can_refine for one in self._refined()[1:])
 
     @property
     def converged(self) -> bool:

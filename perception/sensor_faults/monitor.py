@@ -151,7 +151,7 @@ class SensorMonitor:
         self._least = LEAST_SHARE * ring.range_min_m
         self._near = NEAR_SHARE * ring.range_max_m
         half_step = max(0.5 * ring.resolution_m, SAME_STEP_M)
-        self._last_step = ring.range_max_m - half_step, ring.range_max_m + half_step
+        last_step = ring.range_max_m - half_step, ring.range_max_m + half_step
         self._setup = RingSetup(
             mounts,
             self._turns,
@@ -161,7 +161,7 @@ class SensorMonitor:
             self._tolerance,
             self._least,
             self._near,
-            self._last_step,
+            last_step,
         )
         self._sensors = zeros(SensorMemory, count)
         self._sensor_records = records(SensorMemory, self._sensors)

@@ -109,7 +109,9 @@ class EchoWatch:
         return replace(self, is_open=self.is_open or self.slow_reason is not None)
 
     def touched(self) -> EchoWatch:
-        """Return the watch after a contact: a ring that heard nothing is not known to hear."""
+        """Return the watch after a contact: a ring that heard nothing is not known to hear, and nothing is open."""
+        if self.longest_m > 0.0:  # an echo has ended a silence
+            return replace(self, is_open=False)
         return EchoWatch() if self.is_open or not self.is_over else self
 
     @property

@@ -89,8 +89,9 @@ def test_a_robot_with_a_wrong_clock_stops_by_name(
 
 @promised
 @pytest.mark.promise("P24")
-def test_a_ring_that_lies_is_named_and_nothing_is_touched(measured: Callable[[str], None]) -> None:
-    results = measure(drawn(RING, 2, 2), lambda _: None)
+@pytest.mark.parametrize("count", [2, pytest.param(4, marks=pytest.mark.soak)])
+def test_a_ring_that_lies_is_named_and_nothing_is_touched(count: int, measured: Callable[[str], None]) -> None:
+    results = measure(drawn(RING, count, 2), lambda _: None)
     assert_found(results)
     measured(summed_up(results))
 

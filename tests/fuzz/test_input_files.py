@@ -122,10 +122,11 @@ def random_log(rng: random.Random, sensors: int) -> str:
 @pytest.mark.compiled
 @pytest.mark.promise("P14")
 @pytest.mark.parametrize("method", ["paper", "bayes"])
-def test_random_logs_are_replayed(method: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("logs", [15, pytest.param(40, marks=pytest.mark.soak)])
+def test_random_logs_are_replayed(logs: int, method: str, tmp_path: Path) -> None:
     settings = load_settings("hallway", [f"perception.method={method}"])
     rng = random.Random(14)
-    for _ in range(15):
+    for _ in range(logs):
         path = tmp_path / "log.csv"
         path.write_text(random_log(rng, len(settings.ring.mounts)))
         try:

@@ -38,6 +38,8 @@ SURE_SPAN_WEIGHT: Final = 6.0
 """Least weight of a span of a new wall, or of one that a corner proves; its places are sure to be its wall's."""
 LINE_MISFIT_MAX: Final = 2.5
 """Greatest χ² of the line of a new wall for each degree of freedom."""
+WALL_MISFIT_MAX: Final = 3.0
+"""The same of a wall that stays, and of a reported one."""
 SPAN_CHI2_MIN: Final = -2.0
 """Least evidence of each single span."""
 WALL_MIN_M: Final = 0.5

@@ -40,7 +40,7 @@ from perception.bayes.walls.contact import (
     line_variance,
     tolerance,
 )
-from perception.bayes.walls.evidence import FLAT_BINS_MIN
+from perception.bayes.walls.evidence import FLAT_BINS_MIN, WALL_MISFIT_MAX
 from perception.bayes.walls.fit import fit_walls
 from perception.kernel import kernel
 from perception.records import Structured
@@ -55,8 +55,6 @@ SAME_SHARE: Final = 2
 """So many times more bins must agree than differ."""
 EXPLAINED_SHARE: Final = 0.6
 """A wall ends when others explain this share of its bins, or fewer than `FLAT_BINS_MIN` are its own."""
-MERGED_MISFIT_MAX: Final = 3.0
-"""Greatest χ² of a wall for each degree of freedom; also of one that is reported."""
 EDGE_BINS: Final = 24
 """A frame moves when readings come so near its first or its last bin."""
 FRAME_TURN_MAX: Final = 0.02
@@ -249,7 +247,7 @@ def drop_explained(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, turn
             own = (turn + k) % MAX_WALLS
     if own < 0:
         return
-    if room.walls[own].misfit > MERGED_MISFIT_MAX:
+    if room.walls[own].misfit > WALL_MISFIT_MAX:
         release(room, room.walls[own], p)
         clear_wall(room.walls[own])
         return

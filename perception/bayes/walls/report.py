@@ -13,9 +13,8 @@ from perception.bayes.inference.cross_path import LENGTH_MIN_M
 from perception.bayes.memory.state import ESTABLISHED, Memory
 from perception.bayes.memory.wall_records import MAX_WALLS
 from perception.bayes.walls.contact import EDGES_LEAD, EDGES_SHARE, MIRRORS_SILENCES
-from perception.bayes.walls.evidence import SPAN_CHI2_MIN, SURE_SPAN_WEIGHT, WALL_MIN_M
+from perception.bayes.walls.evidence import SPAN_CHI2_MIN, SURE_SPAN_WEIGHT, WALL_MIN_M, WALL_MISFIT_MAX
 from perception.bayes.walls.fit import WALL_WEIGHT_MIN
-from perception.bayes.walls.merging import MERGED_MISFIT_MAX
 from perception.bayes.walls.numbers import SPAN_MIN_M
 from perception.bayes.walls.reported_points import EVIDENCE_MAX_NAT, end_at_edges, reach_corners
 from perception.bayes.walls.straight import Straight, kept_bins, straight, straighten
@@ -158,7 +157,7 @@ def sure_walls(walls: Structured, corners: Structured) -> dict[int, Straight]:
         All corners.
     """
     found: dict[int, Straight] = {}
-    fitting = np.flatnonzero((walls["weight"] > 0.0) & (walls["misfit"] < MERGED_MISFIT_MAX)).tolist()
+    fitting = np.flatnonzero((walls["weight"] > 0.0) & (walls["misfit"] < WALL_MISFIT_MAX)).tolist()
     misfits = np.maximum(1.0, walls["misfit"])
     heard = corners[(corners["is_used"] == 1) & (corners["echoes"] >= PROOF_ECHOES) & (corners["is_edge"] == 0)]
     heard = heard[heard["echoes"] > PROOF_LEAD * heard["passes"]]

@@ -128,12 +128,12 @@ def beside_known(rows: Structured, near: NDArray[np.int64], prior: float) -> Sur
         for begin, end in runs
         if (end - begin) * length_m >= PIECE_KEPT_M
     ]
-    rest = rows[~is_wall & (near < ALONG).any(axis=1)]  # an unknown object hides no outline
     if prior > 0.0:
         # Where shapes explain little, what is on a post or barrel is no wall, but an outline: no result has the body.
         on_body = near == ON_BODY
-        rest = rows[~is_wall & (free | on_body).any(axis=1)]
-        rest = np.concatenate([rest, _cut(straight, on_body[is_wall])])
+        rest = np.concatenate([rows[~is_wall & (free | on_body).any(axis=1)], _cut(straight, on_body[is_wall])])
+    else:
+        rest = rows[~is_wall & (near < ALONG).any(axis=1)]  # an unknown object hides no outline
     return SurfaceReport(tuple(found), tuple(_polylines(rest)))
 
 

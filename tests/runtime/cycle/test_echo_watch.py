@@ -64,6 +64,13 @@ def test_what_a_robot_touches_in_the_open_it_has_not_heard() -> None:
     assert hears.touched() == hears
 
 
+def test_a_contact_in_a_long_silence_does_not_forget_that_the_ring_has_heard() -> None:
+    watch = EchoWatch(is_over=True, way_m=OPEN_M, longest_m=1.5, at=Pose(0.0, 0.0, 0.0))
+    assert watch.slow_reason == NOTHING_NEW
+    assert watch.armed().slow_reason is None
+    assert watch.armed().touched().slow_reason == NOTHING_NEW
+
+
 def test_a_ring_may_be_deaf_until_its_first_echo() -> None:
     assert EchoWatch().slow_reason == NOTHING_YET
     assert EchoWatch().observe(at(0.0), heard(2.0)).slow_reason is None

@@ -23,8 +23,6 @@ SHORT_S = {
 }  # fmt: skip
 OF_EACH_KIND = ("dock", "guard", "patrol", "wander")
 """Those which the quick form drives: with drums to recognise and without."""
-OF_EACH_KIND = ("dock", "guard", "patrol", "wander")
-"""Those which the quick form drives: with drums to recognise and without."""
 LONG_S = {"round-the-room": 150.0, "inspect-drums": 150.0, "wander": 125.0, "patrol": 120.0}
 NEEDS_DRUMS = {"dock", "dock-from-behind", "guard", "inspect-drums"}
 
