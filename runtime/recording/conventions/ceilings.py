@@ -19,6 +19,8 @@ BAND: Final = 0.12
 """Half width of a noisy band, as a share of its value."""
 BAND_CONTRAST: Final = 5.0
 """How many times as dense as below it the ranges in the band are."""
+DOUBTFUL: Final = 2.5
+"""Contrast of a band that may be silence: the log is refused unless it is said what it is."""
 WIDTHS: Final = 4.5
 """Half width within which a band is looked for, in its standard deviations; beyond it are 7 of a million values."""
 CORE: Final = 2.5
@@ -31,7 +33,7 @@ LEAST_STEPS: Final = 0.02
 """Ranges are rounded to steps of no more than this share of what stands for silence."""
 CUT_SHARE: Final = 0.1
 """Least share of a band whose values are all its greatest one where noise above that is cut off."""
-CUT_NAT: Final = 20.0
+CUT_NAT: Final = 3.0
 """By how much likelier noise that is cut off must be than one exact value."""
 ROUNDS: Final = 30
 """Rounds in which a band's mean and standard deviation are fitted: they then change by less than 1 %."""
@@ -39,6 +41,10 @@ SMOOTH: Final = 0.5
 """Readings of silence differ from one to the next as much as from any other (1); of a wall that is passed, less."""
 LEAP: Final = 1.25
 """A leap is a range longer than those before and after it by this factor."""
+AGREE: Final = 0.05
+"""Readings agree that differ by less, as a share of the shorter one."""
+LONE_MIN: Final = 20
+"""Fewest lone readings in a band that say how wide it is: by n of them, its width is off by 1 / √(2 n) of it."""
 LEAPS_MIN: Final = 30
 """Fewest leaps by which a band is judged."""
 LEAPS_SHARE: Final = 0.55
@@ -95,7 +101,7 @@ def find_band(
     contrast : float
         How many times as dense as below it the ranges in it are at least.
     """
-    centre = float(np.quantile(finite, max(0.0, 1.0 - max(glitches, 3.0 / len(finite)))))
+    centre = float(np.quantile(finite, max(0.0, 1.0 - max(glitches, 3.0 / len(finite))), method="higher"))
     for _ in range(5):
         near = finite[np.abs(finite - centre) <= widest * centre]
         centre = float(np.median(near))
@@ -201,34 +207,78 @@ def spread_of(near: Floats, scale: float = 1.4826) -> float:
 
 
 def find_spikes(ranges: Floats) -> Ceiling | None:
-    """Return the value, or the narrow band at the top, to which ranges leap for single readings, if there is one.
+    """Return the value to which ranges leap for single readings, if there is one.
 
     A sensor that misses an echo leaps to the value of silence and back. Other leaps end at any range.
     """
-    up, down = [], []
+    both = []
     for column in ranges.T:
         values = column[np.isfinite(column)]
         one, around = values[1:-1], np.stack([values[:-2], values[2:]])[:, : max(len(values) - 2, 0)]
-        up.append(one[one > LEAP * around.max(axis=0)])
-        down.append(one[LEAP * one < around.min(axis=0)])
-    leaps = np.sort(np.concatenate(up))
-    both = np.concatenate([leaps, *down])
-    values, counts = np.unique(both, return_counts=True)
-    finite = ranges[np.isfinite(ranges)]
-    if counts.max(initial=0) >= max(LEAPS_MIN, LEAPS_SHARE * len(both)) and values[counts.argmax()] > finite.min():
-        value = float(values[counts.argmax()])
-        noisy = cut_off(leaps[np.abs(leaps - value) <= BAND * value])
-        return _ceiling(finite, *noisy) if noisy else Ceiling.exactly(value)
-    if len(leaps) < LEAPS_MIN:
+        both += [one[one > LEAP * around.max(axis=0)], one[LEAP * one < around.min(axis=0)]]
+    leaps = np.concatenate(both)
+    values, counts = np.unique(leaps, return_counts=True)
+    least = max(LEAPS_MIN, LEAPS_SHARE * len(leaps))
+    if counts.max(initial=0) < least or values[counts.argmax()] <= ranges[np.isfinite(ranges)].min():
         return None
-    end = np.searchsorted(leaps, leaps * (1.0 + BAND), side="right")
-    first = int((end - np.arange(len(leaps))).argmax())
-    inside = leaps[first : end[first]]
-    centre, spread = cut_off(inside) or (float(np.median(inside)), spread_of(inside))
-    above = np.count_nonzero(leaps > centre + WIDTHS * spread)
-    if len(inside) < max(LEAPS_MIN, LEAPS_SHARE * len(leaps)) or above > GLITCHES * ranges.size:
+    value = float(values[counts.argmax()])
+    return noisy_about(value, leaps) or Ceiling.exactly(value)
+
+
+def lone_readings(ranges: Floats) -> Floats:
+    """Return the readings that agree with neither of their neighbours, of all sensors, (n,).
+
+    Two readings of a surface in succession agree, and those of silence only by chance.
+
+    Parameters
+    ----------
+    ranges : (rows, sensors) float
+        Of rows in which the robot moved.
+    """
+    lone = []
+    for column in ranges.T:
+        values = column[np.isfinite(column)]
+        if len(values):
+            values = values[np.r_[True, np.diff(values) != 0.0]]  # a table may repeat each until the next
+            differs = np.abs(np.diff(values)) > AGREE * np.minimum(values[1:], values[:-1])
+            lone.append(values[np.r_[True, differs] & np.r_[differs, True]])
+    return np.concatenate(lone)
+
+
+def lone_band(lone: Floats, finite: Floats) -> Ceiling | None:
+    """Return a band at the top of lone readings that shows among all of them, too, if there is one.
+
+    Parameters
+    ----------
+    lone : (k,) float
+        Of `lone_readings`.
+    finite : (n,) float
+        All ranges.
+    """
+    found = find_band(lone, GLITCHES) if len(lone) >= LEAPS_MIN else None
+    if found is None or np.count_nonzero(found.inside(lone)) < LONE_MIN:
         return None
-    return _ceiling(finite, centre, spread)
+    found = _ceiling(finite, found.centre, found.spread)
+    return found if found.stands_out(finite, DOUBTFUL) and _is_top(found, finite) else None
+
+
+def doubtful_top(lone: Floats, finite: Floats) -> Ceiling | None:
+    """Return the top of lone readings if they are denser there than below it; parameters as of `lone_band`."""
+    if len(lone) < LEAPS_MIN:
+        return None
+    top = float(np.quantile(lone, 1.0 - FEW_GLITCHES, method="lower"))
+    inside = lone[(lone > (1.0 - BAND) * top) & (lone <= top)]
+    below = np.count_nonzero((lone > (1.0 - 2.0 * BAND) * top) & (lone <= (1.0 - BAND) * top))
+    found = find_band(lone, GLITCHES, BAND, DOUBTFUL)
+    if len(inside) >= max(LONE_MIN, DOUBTFUL * below):
+        found = Ceiling(float(inside.min()), float(inside.max()), float(np.median(inside)), float(inside.std()))
+    return found if found is not None and _is_top(found, finite) else None
+
+
+def _is_top(band: Ceiling, finite: Floats) -> bool:
+    """Return whether hardly any range, of (n,), is above a band."""
+    above = np.count_nonzero(finite > band.centre + WIDTHS * band.spread)
+    return bool(above <= FEW_GLITCHES * len(finite))
 
 
 def _ceiling(finite: Floats, centre: float, spread: float) -> Ceiling:
@@ -249,7 +299,7 @@ def _ceiling(finite: Floats, centre: float, spread: float) -> Ceiling:
     ends = []
     for side in (-1.0, 1.0):
         away = side * (finite - centre)
-        beside = np.count_nonzero((away > width) & (away <= 5.0 * width))
-        ratio = count / (math.sqrt(2.0 * math.pi) * spread) * 4.0 * width / max(int(beside), 1)
+        beside = int(np.count_nonzero((away > width) & (away <= 2.0 * width)))
+        ratio = count / (math.sqrt(2.0 * math.pi) * spread) * width / beside if beside else math.inf
         ends.append(centre + side * spread * min(WIDTHS, math.sqrt(2.0 * math.log(max(ratio, 1.0)))))
     return Ceiling(ends[0], ends[1], centre, spread)

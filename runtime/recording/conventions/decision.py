@@ -31,7 +31,8 @@ from runtime.recording.conventions.repeats import Repeats, find_repeats, noise_o
 from runtime.recording.conventions.sensor_order import Shift, find_exchange, find_shift, mirrored_columns
 from runtime.recording.conventions.silence import Silence, check_near, find_silence
 from runtime.recording.conventions.table import ANGLES, HEADINGS, LENGTHS, TIMES, Table
-from runtime.recording.conventions.units import Units, check_scale, find_units, way_ratios
+from runtime.recording.conventions.units import Units, check_scale, find_units
+from runtime.recording.conventions.way_ratios import way_ratios
 from runtime.recording.ring_log import RingLogError
 
 KERNEL: Final = 0.07

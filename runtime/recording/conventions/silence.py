@@ -18,11 +18,15 @@ from runtime.recording.conventions.beams import Beams
 from runtime.recording.conventions.ceilings import (
     BAND,
     BAND_CONTRAST,
+    DOUBTFUL,
     GLITCHES,
     TOP_SHARE,
     Ceiling,
+    doubtful_top,
     find_band,
     find_spikes,
+    lone_band,
+    lone_readings,
     noisy_about,
     top_band,
     unlike_wall,
@@ -37,10 +41,10 @@ MODE_SHARE: Final = 0.05
 """Least share of the ranges that are silence where others are beside it."""
 NOISY_SHARE: Final = 0.02
 """A value of silence has noise if those beside it are more than this share of it."""
-DOUBTFUL: Final = 2.5
-"""Contrast of a band that may be silence: the log is refused unless it is said what it is."""
 WIDE_BAND: Final = 0.2
 """Half width of such a band, as a share of its value."""
+BESIDE: Final = 0.03
+"""Ranges shorter than the greatest one by less than this share may be its noise."""
 TAKEN: Final = ", which is taken for silence (inf)"
 RANGES_MIN: Final = 100
 EVERYWHERE: Final = 0.3
@@ -167,7 +171,7 @@ def _most_frequent(moved: Floats, finite: Floats, beams: Beams) -> Silence:
     if len(finite_moved) < RANGES_MIN or finite_moved.min() == finite_moved.max():
         return Silence()
     foreseen = None
-    for found, contrast in _candidates(moved, finite_moved):
+    for found, contrast in _candidates(moved, finite_moved, beams):
         inside, silence = found.inside(moved), _silence(found, finite)
         at_one_angle = beams.at_one_angle(inside, found.low, found.high)
         foreseen = beams.foreseen(moved) if foreseen is None else foreseen
@@ -189,9 +193,11 @@ def _most_frequent(moved: Floats, finite: Floats, beams: Beams) -> Silence:
     return Silence()
 
 
-def _candidates(moved: Floats, finite_moved: Floats) -> Iterator[tuple[Ceiling, float]]:
+def _candidates(moved: Floats, finite_moved: Floats, beams: Beams) -> Iterator[tuple[Ceiling, float]]:
     """Yield what may stand for silence, and the contrast by which it does: parameters as of `_most_frequent`."""
-    top = unlike_wall(top_band(finite_moved), moved)
+    lone = lone_readings(moved)
+    bands = (unlike_wall(top_band(finite_moved), moved), lone_band(lone, finite_moved))
+    top = max(bands, key=lambda one: 0 if one is None else np.count_nonzero(one.inside(finite_moved)))
     values, counts = np.unique(finite_moved, return_counts=True)
     counts[0] = 0  # what is too near is given as the least range, by many rings
     most = int(counts.argmax())
@@ -210,6 +216,12 @@ def _candidates(moved: Floats, finite_moved: Floats) -> Iterator[tuple[Ceiling, 
         yield top, BAND_CONTRAST
     if (spikes := find_spikes(moved)) is not None:
         yield spikes, BAND_CONTRAST
+    last = float(values[-1])
+    beside = np.count_nonzero((finite_moved < last) & (finite_moved > (1.0 - BESIDE) * last))
+    if counts[-1] >= max(ELSEWHERE_MIN, DOUBTFUL * beside) and beams.is_greatest(last):
+        yield Ceiling.exactly(last), BAND_CONTRAST
+    if (doubtful := doubtful_top(lone, finite_moved)) is not None:
+        yield doubtful, DOUBTFUL
     for widest in (BAND, WIDE_BAND):
         if (wide := unlike_wall(find_band(finite_moved, GLITCHES, widest, DOUBTFUL), moved)) is not None:
             yield wide, DOUBTFUL

@@ -20,6 +20,7 @@ from runtime.recording.conventions.headings import sureness
 from runtime.recording.conventions.options import RingLogOptions
 from runtime.recording.conventions.silence import Silence
 from runtime.recording.conventions.table import ANGLES, LENGTHS, TIMES, Table
+from runtime.recording.conventions.way_ratios import PAIR_LN
 from runtime.recording.ring_log import RingLogError
 
 SURE_NAT: Final = 12.0
@@ -66,10 +67,6 @@ EDGE_NAT: Final = 4.3
 """Log of how rarely they end there by chance: where they do is a matter of the room, over a factor of 4 or so."""
 EDGE_GLITCHES: Final = 0.05
 """Share of the ranges about the greatest one that may lie beyond it."""
-PAIR_ALONG: Final = 0.85
-"""Least cosine between the way and the beam where a range's change is compared with the way."""
-PAIR_LN: Final = 0.12
-"""Spread of the logarithm of the ratio of both."""
 PAIRS_WEIGHT: Final = 0.2
 """What a pair counts, as neighbouring ones share an echo."""
 PAIRS_MAX: Final = 150
@@ -362,39 +359,3 @@ def _reason(default: Units, best: Units, facts: _Facts, robot: RobotConfig) -> s
 def _too_fast(rate_rad_s: float, robot: RobotConfig) -> str:
     limit = robot.body.turn_max_rad_s
     return f"theta turns at {rate_rad_s:.3g} rad/s, and this robot's body.turn_max_rad_s is {limit:g}"
-
-
-def way_ratios(table: Table, robot: RobotConfig, yaw: Floats, hand: int) -> Floats:
-    """Return how much ranges changed for each unit of way along the beam, where the robot drove along one.
-
-    Parameters
-    ----------
-    table : Table
-        In the file's units.
-    robot : RobotConfig
-        Its ring.
-    yaw : (n,) float
-        Direction of the ring, rad counter-clockwise in the frame of x and hand · y.
-    hand : int
-        As `HeadingRule.hand`.
-    """
-    x, y = table.pose[:, 0], hand * table.pose[:, 1]
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
-    least = way[-1] / 300.0
-    found: list[Floats] = []
-    for sensor, mount in enumerate(robot.ring.mounts):
-        rows = np.flatnonzero(np.isfinite(table.ranges[:, sensor]))
-        if len(rows) < 3 or least <= 0.0:
-            continue
-        later = np.searchsorted(way[rows], way[rows] + least)
-        begin = np.flatnonzero(later < len(rows))
-        a, b = rows[begin], rows[later[begin]]
-        dx, dy = x[b] - x[a], y[b] - y[a]
-        far = np.hypot(dx, dy)
-        turned = np.abs(np.angle(np.exp(1j * (yaw[b] - yaw[a]))))
-        beam = yaw[a] + mount.angle_rad
-        along = (dx * np.cos(beam) + dy * np.sin(beam)) / np.maximum(far, 1e-300)
-        good = (np.abs(along) > PAIR_ALONG) & (turned < 0.1) & (far < 3.0 * least)
-        change = (table.ranges[a[good], sensor] - table.ranges[b[good], sensor]) / (far * along)[good]
-        found.append(change[change > 0.0])
-    return np.concatenate(found) if found else np.empty(0)

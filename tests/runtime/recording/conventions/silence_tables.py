@@ -17,8 +17,10 @@ from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Floats, Pose
 from runtime.recording.conventions.decision import decide
+from runtime.recording.conventions.headings import Angles
 from runtime.recording.conventions.options import AUTO
 from runtime.recording.conventions.table import Table
+from runtime.recording.conventions.units import Units
 from runtime.recording.ring_log import RingLogError
 from tests.runtime.recording.conventions.tables import MODELS, ROBOTS, WORLDS, make_drive
 
@@ -123,6 +125,8 @@ def outcome(case: SilenceTable) -> tuple[str, str]:
         found = decide(case.table, case.settings, AUTO)
     except RingLogError as error:
         return ("refused" if "--silence" in str(error) else "unclear"), str(error)
+    if found.units != Units() or found.angles != Angles() or found.columns is not None:
+        return "wrong", f"{found.said}"
     ranges = case.table.ranges
     got, fired = np.isposinf(found.silence.applied(ranges)), ~np.isnan(ranges)
     missed, silenced = int((case.is_silent & ~got).sum()), int((got & ~case.is_silent & fired).sum())

@@ -28,8 +28,8 @@ from runtime.recording.conventions.units import (
     _reason,
     _way_score,
     find_units,
-    way_ratios,
 )
+from runtime.recording.conventions.way_ratios import way_ratios
 from runtime.recording.ring_log import RingLogError
 from tests.runtime.recording.conventions.tables import Drive, make_drive
 
