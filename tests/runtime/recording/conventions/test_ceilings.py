@@ -44,7 +44,7 @@ def test_lone_readings_agree_with_neither_neighbour() -> None:
 def test_a_band_among_far_walls_shows_in_lone_readings() -> None:
     rng = np.random.default_rng(4)
     band = 4.8 + 0.03 * rng.standard_normal(60)
-    finite = np.concatenate([rng.uniform(1.0, 4.6, 1200), band, rng.uniform(4.6, 4.85, 40)])
+    finite = np.concatenate([rng.uniform(1.0, 4.6, 1200), band, rng.uniform(4.6, 4.85, 20)])
     lone = np.concatenate([finite[:40], band[:30]])
     found = lone_band(lone, finite)
     assert found is not None
