@@ -4,6 +4,7 @@ Each trial is a drive in virtual time through a room, the protocol included. At 
 then on the drive lasts until the robot stops by itself, at most for `LIE_S`. What the robot touches, and how fast, is
 the emulator's truth and not what the robot reports. A lie is named by a stop with a reason, by a sensor that is
 reported, by a note of the driver, by the line that nothing is heard, or by the reason why the robot drives slowly.
+A turned ring is named by a stop, or where the robot drives slowly as the ring seems turned, and by nothing else.
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ BUILT: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType({
 CLOCK, OF_TWO = "clock", ("exchanged", "but one")
 """Kinds with these words change nothing on a robot whose packets carry no stamps, and on one with one sensor."""
 HELD: Final = frozenset({LOST, NOTHING_NEW, NOTHING_SO_FAR, NOTHING_YET, REMEMBERED, UNHEARD})
-"""Reasons to hold that name a lie; that of a ring which seems to be turned names only one that is."""
+"""Reasons to hold that name a lie, but for a turned ring: that has its own."""
 AHEAD_DEG: Final = 60.0
 MOVED_M: Final = 0.5
 """A robot that has driven less since a lie began has hardly changed what it hears."""
@@ -197,7 +198,7 @@ def run_trial(
     budget, cycle = QuantumBudget(QUANTA_PER_CYCLE), 0
     until_s = begin_s + (HONEST_S if kind is None else LIE_S)
     is_turned = (kind or "").startswith("turned") or (kind == "one backwards" and settings.ring.has_servo)
-    names = frozenset[str]() if kind is None else HELD | {ARM_DOUBTED, DOUBTED} if is_turned else HELD
+    names = frozenset[str]() if kind is None else frozenset({ARM_DOUBTED, DOUBTED}) if is_turned else HELD
     run_s = before_m_s = speed_m_s = contact_m_s = way_m = 0.0
     place = device.truth.pose
     contact_s = named_s = said = held = None
@@ -223,7 +224,7 @@ def run_trial(
             contact_m_s, contact_s = truth.contact_m_s, run_s - begin_s
         if named_s is None:
             texts = []
-            if kind is not None:
+            if kind is not None and not is_turned:  # nothing else says that a ring is turned, but a stop
                 texts += [text for key, text in reports.items() if key not in known]
                 texts += [note for note in inputs.received.notes if note not in known]
                 texts += [line for line in [state.echo_watch.silence] if line is not None and line not in known]

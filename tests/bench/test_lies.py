@@ -181,3 +181,11 @@ def test_a_fault_that_a_robot_is_built_with_is_named_in_its_first_turn(kind: str
     assert result.named_s is not None
     assert result.named_s < 6.0
     assert not result.is_contact
+
+
+@pytest.mark.parametrize("kind", ["turned 90", "turned 180"])
+def test_only_what_says_that_a_ring_is_turned_names_it(kind: str) -> None:
+    """A sensor that is reported, or a ring that hears nothing new, would be named as another fault."""
+    results = [run_trial("hobby8", room, kind, 181000, moment) for room, moment in (("corridor", 0), ("room", 1))]
+    assert [one.said for one in results if one.said is not None and "turned" not in one.said] == []
+    assert results[0].said is not None
