@@ -77,8 +77,8 @@ coverage: $(VENV)/test.stamp
 	$(BIN)/python -m slipcover --merge $(LINES)/*.json --out $(VENV)/lines.json --skip-covered --fail-under 95
 
 # Drives and damaged states with array bounds checked, which compiled code does not do by default. Each kernel is compiled
-# for it and called little, so it is optimised less. Kernels of places and grids are checked so by `make soak` alone,
-# those of the emulator by `make interpreted`, too: Python checks indices.
+# for it and called little, so it is optimised less. Kernels of places, grids, surfaces and the paper's method are checked
+# so by `make soak` alone; what `make interpreted` runs is checked, too, as Python checks indices.
 boundscheck: $(VENV)/test.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 $(PYTEST) $(BOUNDSCHECKED) -m "boundscheck and not soak"
 

@@ -32,6 +32,7 @@ def test_the_first_drum_that_answers_is_the_emulators() -> None:
             assert found == pytest.approx(distance)
 
 
+@pytest.mark.soak
 @pytest.mark.compiled
 def test_it_follows_a_drive_whose_drums_it_knows() -> None:
     path = oval()[:150]

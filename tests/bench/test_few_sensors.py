@@ -48,7 +48,7 @@ def test_where_no_place_is_so_far_away_the_farthest_is_the_goal() -> None:
 
 @pytest.mark.compiled
 @pytest.mark.parametrize(
-    ("seconds", "arrived", "way_m"), [(30.0, 0, 4.0), pytest.param(98.0, 1, 15.0, marks=pytest.mark.soak)]
+    ("seconds", "arrived", "way_m"), [(8.0, 0, 0.5), pytest.param(98.0, 1, 15.0, marks=pytest.mark.soak)]
 )
 def test_a_drive_is_counted(seconds: float, arrived: int, way_m: float) -> None:
     """In a room in which a robot that waited for a quiet second before each start gave its second goal up."""

@@ -36,6 +36,7 @@ def test_one_ray_a_disc_on_a_raster_of_20_mm_finds_the_six_drums() -> None:
     assert max(errors_m) < 0.02
 
 
+@pytest.mark.soak
 @pytest.mark.compiled
 def test_with_pose_jitter_walls_and_the_drum_are_found_and_an_edge_of_a_doorway_is_no_drum() -> None:
     settings = load_settings("hallway", ["perception.method=bayes"])

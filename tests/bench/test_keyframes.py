@@ -71,7 +71,7 @@ def test_each_robot_drives_once_and_every_method_meets_every_grid() -> None:
 
 @pytest.mark.parametrize(
     "seed",
-    [pytest.param(k, marks=[] if k % 6 == 0 else [pytest.mark.soak]) for k in range(len(SHORT))],
+    [pytest.param(k, marks=[] if k % 12 == 0 else [pytest.mark.soak]) for k in range(len(SHORT))],
 )
 def test_each_robot_drives_a_little_and_no_keyframe_is_refused(seed: int) -> None:
     """And no number would come near its bound in a day if it grew on as it does here."""
@@ -85,8 +85,8 @@ def test_each_robot_drives_a_little_and_no_keyframe_is_refused(seed: int) -> Non
 @pytest.mark.parametrize(
     ("run", "robot", "seconds", "sets"),
     [
-        ("office", "denning", 6.0, ()),
-        ("room", "p3dx", 6.0, ("perception.grid.method=off",)),
+        pytest.param("office", "denning", 6.0, (), marks=pytest.mark.soak),
+        pytest.param("room", "p3dx", 6.0, ("perception.grid.method=off",), marks=pytest.mark.soak),
         ("room", "ears", 6.0, ("perception.grid.method=elfes",)),
     ],
 )
@@ -109,6 +109,7 @@ def test_a_refused_keyframe_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     assert name in found.refused[0]
 
 
+@pytest.mark.soak
 def test_a_line_of_json_is_printed_for_each_run(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(seconds=41.0, robots=("amigo",), worlds=("hallway",)) == DONE
     (line,) = capsys.readouterr().out.splitlines()

@@ -44,6 +44,7 @@ def test_drives_lie_on_the_way_of_the_laser(tmp_path: Path) -> None:
     assert [trial.goal for trial in again] == [trial.goal for trial in trials]
 
 
+@pytest.mark.soak
 @pytest.mark.compiled
 def test_every_method_drives_to_a_goal_in_the_open() -> None:
     wall = WallConfig(x1_m=-3.0, y1_m=-2.0, x2_m=6.0, y2_m=-2.0)

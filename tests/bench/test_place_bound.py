@@ -54,7 +54,7 @@ def test_readings_of_anything_are_the_least_likelihood(range_m: float) -> None:
     assert abs(int(cone) - best) <= 1
 
 
-@pytest.mark.parametrize("reflection", [pytest.param("cone", marks=pytest.mark.soak), "specular"])
+@pytest.mark.parametrize("reflection", [pytest.param(one, marks=pytest.mark.soak) for one in ("cone", "specular")])
 def test_an_unknown_place_is_found(reflection: Reflection) -> None:
     truth = np.array([[1.0 + 0.25 * k, 1.2 + 0.1 * k, 0.4] for k in range(12)])
     firings = []

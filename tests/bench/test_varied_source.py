@@ -39,6 +39,7 @@ def test_numbers_are_found_with_their_other_values() -> None:
     assert TunedNumber("m", "KEPT", 20).variants() == (14, 28)
 
 
+@pytest.mark.soak
 def test_only_kernels_that_depend_on_a_number_change() -> None:
     shipped, (varied, other, same) = kernel_digests(), varied_digests()
     assert (other, same) == (8, sight_lines.LOCATED_RAD) != (sight_lines.RAYS, sight_lines.LOCATED_RAD)

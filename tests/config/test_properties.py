@@ -89,7 +89,7 @@ def check(data: bytes, changes: list[str]) -> None:
                     assert len(line) < 1000, line
 
 
-@examples(0.3)
+@examples(0.1)
 @given(tables, overrides)
 def test_any_table(table: dict[str, Any], changes: list[str]) -> None:
     check(document(table).encode(), changes)

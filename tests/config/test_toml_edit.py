@@ -78,6 +78,7 @@ def test_a_text_that_would_say_something_else_is_refused(monkeypatch: pytest.Mon
         with_value(ROBOT, ("skippy", "trim"), 2)
 
 
+@examples(0.3)
 @given(
     st.sampled_from([("skippy", "trim"), ("ring", "count"), ("body", "trim"), ("skippy", "new"), ("robot", "name")]),
     st.booleans() | st.integers(-(2**60), 2**60) | st.floats(-1e9, 1e9) | st.text(max_size=9),

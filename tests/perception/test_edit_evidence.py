@@ -139,7 +139,7 @@ def test_evidence_for_an_object_that_is_not_a_model(reached_drums: Perception) -
 
 
 @pytest.mark.compiled
-@pytest.mark.boundscheck
+@pytest.mark.boundslong
 def test_a_snapshot_holds_the_edited_state(seen: Perception, firings: list[Firing]) -> None:
     """Perception continues from a snapshot taken between edits with identical results."""
     objects, listed = seen.objects(), seen.segments().numbers.tolist()

@@ -140,6 +140,7 @@ def test_a_copy_loads_what_another_compiled_and_an_edit_compiles_anew(tmp_path: 
     assert run("first", SOURCE) == ["8.5", "1"]
 
 
+@pytest.mark.soak
 def test_a_program_that_names_no_folder_leaves_no_kernels_where_it_runs(tmp_path: Path) -> None:
     """Not in the folder it runs in: beside the sources, or in the user's cache."""
     (tmp_path / "kernels_of_test.py").write_text(SOURCE)

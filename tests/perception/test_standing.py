@@ -62,7 +62,6 @@ def test_the_last_readings_of_a_drive_take_no_wall_and_no_drum_away(seed: int, m
 @pytest.mark.parametrize(
     ("seed", "model"),
     [
-        (2008, "cone"),
         *(pytest.param(*both, marks=pytest.mark.soak) for both in itertools.product([2004, 2008], MODELS)),
     ],
 )

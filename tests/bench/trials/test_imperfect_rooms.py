@@ -23,10 +23,10 @@ def surfaces_of(world: WorldConfig) -> set[str | None]:
 
 
 def test_a_seed_is_one_room_whatever_it_is_heard_by() -> None:
-    for seed in SEEDS[:2]:
+    for seed in SEEDS[:1]:
         mixed = mixed_room(seed).world
         assert mixed == imperfect_room(seed).world
-        for model in sorted(MODELS.keys() - {"mixture"})[:: 1 if seed else 3]:
+        for model in sorted(MODELS.keys() - {"mixture"})[::3]:
             world = imperfect_room(seed, model).world
             for kind in ("wall", "box", "drum"):
                 bare = [

@@ -74,6 +74,7 @@ def test_figures_are_shares_of_all_drives() -> None:
     assert math.isnan(figures([])["error, ft"])
 
 
+@pytest.mark.soak
 def test_a_drive_hears_much_and_what_it_reports_stands_there() -> None:
     trial = try_room(load_settings("hallway"), imperfect_room(1, "cone"), 1, 0.3)
     assert trial.drums == 3

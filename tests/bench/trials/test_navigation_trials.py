@@ -36,6 +36,7 @@ def test_it_arrives_across_random_rooms_and_touches_nothing(rooms: Sequence[int]
     assert row["speed_share"] >= 0.7
 
 
+@pytest.mark.soak
 @pytest.mark.compiled
 def test_a_goal_inside_a_drum_is_given_up_and_the_robot_stands() -> None:
     """The drive ends by itself with the reason; the same drive gives the same bits."""

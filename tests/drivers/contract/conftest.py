@@ -16,6 +16,10 @@ def _installed_example(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "plugged", lambda group: {CHIRP_ENTRY.name: CHIRP_ENTRY} if group == GROUP else {})
 
 
-@pytest.fixture(params=sorted(FAMILIES))
+EACH = [pytest.param(name, marks=[pytest.mark.soak] if name == "servo1" else []) for name in sorted(FAMILIES)]
+"""The robot with a servo has the driver of `denning`, and its own tests."""
+
+
+@pytest.fixture(params=EACH)
 def family(request: pytest.FixtureRequest) -> Family:
     return FAMILIES[request.param]

@@ -24,7 +24,7 @@ from tests.drivers.emulator.one_sensor import drum, hear, wall, world_of
 
 # Against the oracles.
 
-WORLDS = (40, pytest.param(1000, marks=pytest.mark.soak))
+WORLDS = (15, pytest.param(1000, marks=pytest.mark.soak))
 """Random worlds."""
 
 RAYS = 3

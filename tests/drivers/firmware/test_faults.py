@@ -39,7 +39,7 @@ from tests.drivers.firmware.talk import (
 # Conversation.
 
 
-@pytest.mark.parametrize(("board", "count"), [("pico", 12), ("esp32", 12)])
+@pytest.mark.parametrize(("board", "count"), [pytest.param("pico", 12, marks=pytest.mark.soak), ("esp32", 12)])
 def test_the_driver_connects_drives_and_gets_twenty_firings_a_second(
     boards: Boards, board: Board, count: int
 ) -> None:
@@ -175,7 +175,12 @@ def test_halt_latches_until_release(boards: Boards) -> None:
 
 
 @pytest.mark.parametrize(
-    ("v", "w", "x", "heading"), [(300, 0, 0.6, 0.0), (-300, 0, -0.6, 0.0), (0, 1000, 0.0, 2.0), (0, -1000, 0.0, -2.0)]
+    ("v", "w", "x", "heading"),
+    [
+        (-300, 0, -0.6, 0.0),
+        (0, 1000, 0.0, 2.0),
+        *(pytest.param(*one, marks=pytest.mark.soak) for one in ((300, 0, 0.6, 0.0), (0, -1000, 0.0, -2.0))),
+    ],
 )
 def test_it_drives_as_it_is_asked_and_knows_where_it_is(
     boards: Boards, v: int, w: int, x: float, heading: float

@@ -55,8 +55,14 @@ def errors_us(echoes: list[Echo2], triggers: list[int]) -> list[float]:
 # Echoes.
 
 
-@pytest.mark.parametrize("board", ["pico", "esp32"])
-@pytest.mark.parametrize("steps", [12, 3])
+@pytest.mark.parametrize(
+    ("board", "steps"),
+    [
+        ("pico", 12),
+        ("esp32", 3),
+        *(pytest.param(*one, marks=pytest.mark.soak) for one in (("esp32", 12), ("pico", 3))),
+    ],
+)
 def test_echo_times_are_those_of_the_sensors_within_20_us(boards: Boards, board: Board, steps: int) -> None:
     """One sensor a step, or four of them that share a trigger pin."""
     robot = boards(board)
@@ -195,7 +201,7 @@ def test_the_clock_and_the_steps_pass_the_wrap_of_the_boards_counter(boards: Boa
     assert h.flags() == Flags.NONE
 
 
-@pytest.mark.parametrize("seconds", [12, pytest.param(600, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("seconds", [8, pytest.param(600, marks=pytest.mark.soak)])
 def test_no_frame_is_lost_and_the_heap_stays_flat(boards: Boards, seconds: int) -> None:
     robot = boards("pico", EIGHT)
     h = host(robot)

@@ -1,6 +1,6 @@
 """Random halls with mirrors for walls and decoys among the drums, on seeds that were not used for tuning.
 
-Sixteen here; `echolocate experiment hallway --scene halls --seeds 100` measures a hundred.
+Six here; `echolocate experiment hallway --scene halls --seeds 100` measures a hundred.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from runtime.simulation.random_halls import random_hall
 pytestmark = pytest.mark.compiled
 
 FT = 0.3048
-SEEDS = range(5000, 5016)
+SEEDS = range(5000, 5006)
 SETTINGS = load_settings("hallway", ["perception.method=bayes"])
 
 
@@ -36,10 +36,10 @@ def test_drums_are_found_and_nothing_else(outcomes: list[HallOutcome]) -> None:
 
 
 def test_the_covariance_is_honest(outcomes: list[HallOutcome]) -> None:
-    """The 95 % ellipses hold 92 to 98 %, and three binomial standard deviations more or less: 128 drums are few."""
+    """The 95 % ellipses hold 92 to 98 %, and three binomial standard deviations more or less: 48 drums are few."""
     inside = [actual for outcome in outcomes for actual in outcome.inside]
     slack = 3.0 * math.sqrt(0.95 * 0.05 / len(inside))
-    assert len(inside) > 100
+    assert len(inside) > 40
     assert 0.92 - slack <= np.mean(inside) <= 0.98 + slack
 
 

@@ -41,7 +41,7 @@ def errors_ft(objects: tuple[DetectedObject, ...], places_ft: list[tuple[float, 
 HALL = [(x, y) for x in (1.0, 4.0, 7.0) for y in (4.0, -4.0)]
 
 
-@pytest.mark.boundscheck
+@pytest.mark.boundslong
 def test_exactly_six_drums_are_found_within_the_errors_of_table_2() -> None:
     perception = perceive(settings())
     for firing in drive(load_world("hallway")):
@@ -157,7 +157,7 @@ def test_the_segments_of_a_removed_drum_are_contradicted() -> None:
 
 
 @pytest.mark.compiled
-@pytest.mark.boundscheck
+@pytest.mark.boundslong
 def test_a_full_map_drops_its_oldest_segments() -> None:
     perception = perceive(settings(map=MapConfig(capacity=64)))
     for firing in drive(load_world("hallway")):

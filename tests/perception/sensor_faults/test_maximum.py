@@ -53,6 +53,7 @@ def test_a_wall_at_the_end_of_the_range_is_an_echo(turned_rad: float) -> None:
     assert reports(watch) == {}
 
 
+@pytest.mark.covered
 def test_a_ring_that_also_reports_silence_is_believed() -> None:
     watch, rng = SensorMonitor(RING), np.random.default_rng(4)
     for k in range(2_000):

@@ -17,6 +17,7 @@ def compared(run: Path, settings: Settings) -> Comparison:
         return compare_runs(recording, settings)
 
 
+@pytest.mark.soak
 @pytest.mark.compiled
 def test_another_method_changes_objects_and_no_command(run: Path) -> None:
     """The robot drives along its leg, whatever is recognised."""

@@ -67,6 +67,7 @@ def test_a_long_recording_is_read_from_its_keyframes(
     assert len(times) > 5
 
 
+@pytest.mark.soak
 def test_a_recording_with_refused_keyframes_is_read_and_they_are_noted(
     hall_run: Path, timeline: Timeline, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

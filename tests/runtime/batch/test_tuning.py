@@ -178,7 +178,7 @@ def test_a_beam_that_is_set_too_wide_is_found_without_the_truth(
     wrong, beam = ("ring.beam_half_angle_deg=24.0",), "ring.beam_half_angle_deg"
     study = StudyConfig(
         recordings="logs", models=(MODEL,), sets=wrong, objectives=("predicted_nat",),
-        vary=(VaryConfig(setting=beam, values=(32.0, 12.0)),),
+        vary=(VaryConfig(setting=beam, values=(12.0,)),),
     )  # fmt: skip
     rows: dict[str, Any] = {}
 
@@ -190,7 +190,7 @@ def test_a_beam_that_is_set_too_wide_is_found_without_the_truth(
 
     search = RandomSearch(study.vary, 1)
     tuned = Tuner(study, tmp_path, make).search(search, 4)
-    assert len(rows) == 3, "the present and both values"
+    assert len(rows) == 2, "the present and the other value"
     assert tuned.best.values == {beam: 12.0}
     assert tuned.held_out == []
     assert recalled(tmp_path, wrong)["found_searched"] == 0.0

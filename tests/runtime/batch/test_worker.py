@@ -60,6 +60,7 @@ def test_a_model_that_is_not_round_has_a_truth_too() -> None:
     assert (figures["truth"], figures["found"], figures["false"], figures["max_error_m"]) == (1, 1, 1, 0.0)
 
 
+@pytest.mark.soak
 @pytest.mark.compiled
 def test_recordings_are_replayed_with_other_settings(hall_run: Path, hall_log: Path, tmp_path: Path) -> None:
     for file in (hall_run, hall_log):

@@ -153,7 +153,7 @@ def test_an_echo_ends_the_watch_and_cycles_without_firings_do_not_count() -> Non
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("robot", ["servo1", "denning"])
+@pytest.mark.parametrize("robot", [pytest.param("servo1", marks=pytest.mark.soak), "denning"])
 def test_a_ring_that_never_hears_stops_the_robot_before_it_touches(
     robot: str, measured: Callable[[str], None]
 ) -> None:

@@ -39,7 +39,9 @@ def driven(robot: str, *faults: Fault, until_s: float = 20.0) -> Run:
 
 
 @pytest.mark.parametrize("robot", ["denning", pytest.param("p3dx", marks=pytest.mark.soak)])
-@pytest.mark.parametrize("lie", LIES)
+@pytest.mark.parametrize(
+    "lie", [pytest.param(lie, marks=[pytest.mark.soak] if lie in {"constant", "random"} else []) for lie in LIES]
+)
 def test_it_stops_with_the_reason_before_it_touches_anything(
     lie: str, robot: str, measured: Callable[[str], None]
 ) -> None:
@@ -52,7 +54,7 @@ def test_it_stops_with_the_reason_before_it_touches_anything(
     measured(f"{robot}, {lie}: stopped {run.run_s - fault.at_s:.2f} s later")
 
 
-@pytest.mark.parametrize("robot", ["denning", "p3dx"])
+@pytest.mark.parametrize("robot", [pytest.param("denning", marks=pytest.mark.soak), "p3dx"])
 def test_an_honest_ring_drives_on(robot: str) -> None:
     run = driven(robot, until_s=15.0)
     assert run.mode is Mode.DRIVE
@@ -69,7 +71,9 @@ def test_sensors_that_read_what_they_cannot_are_named_and_stop_the_robot(measure
     measured(f"two sensors ahead that answer 1 cm: named, SAFE_STOP after {run.run_s:.1f} s")
 
 
-@pytest.mark.parametrize(("range_m", "fault"), [(0.09, "too_near"), (0.12, "stuck")])
+@pytest.mark.parametrize(
+    ("range_m", "fault"), [pytest.param(0.09, "too_near", marks=pytest.mark.soak), (0.12, "stuck")]
+)
 def test_a_robot_that_turns_away_from_what_its_sensors_repeat_does_not_turn_for_ever(
     range_m: float, fault: str
 ) -> None:

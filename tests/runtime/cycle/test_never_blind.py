@@ -93,7 +93,7 @@ def assert_safe(run: WatchedRun) -> None:
 
 
 @pytest.mark.parametrize(("sensors", "said"), [
-    (range(24), "the ring fires, but no sensor has given a usable range for"),
+    pytest.param(range(24), "the ring fires, but no sensor has given a usable range for", marks=pytest.mark.soak),
     (AHEAD, "the ring has not looked ahead for 3.0 s: no usable range from sensor 0, 1, 2, 3, 21, 22, 23;"),
     ([0], "the ring has not looked ahead for 3.0 s: no usable range from sensor 0;"),
 ], ids=["all", "ahead", "one"])  # fmt: skip
@@ -165,7 +165,7 @@ PATTERNS = {
 
 @pytest.mark.parametrize(
     "preset",
-    [pytest.param(one, marks=[] if one in {"single", "alternating"} else [pytest.mark.soak]) for one in PATTERNS],
+    [pytest.param(one, marks=[] if one == "alternating" else [pytest.mark.soak]) for one in PATTERNS],
 )
 def test_every_preset_drives(preset: str) -> None:
     chosen = settings(f"ring.firing={preset}")
@@ -180,9 +180,10 @@ def test_every_preset_drives(preset: str) -> None:
 
 
 @pytest.mark.parametrize("firing", [
-    "{preset='single', step_period_s=0.1}", "{sets=[[9, 12, 15], [10, 13], [11, 14]]}",
+    "{sets=[[9, 12, 15], [10, 13], [11, 14]]}",
     *(pytest.param(one, marks=pytest.mark.soak)
-      for one in ("{sets=[[0]]}", "{sets=[[0, 8, 16]], rotations=8, step_period_s=0.4}")),
+      for one in ("{preset='single', step_period_s=0.1}", "{sets=[[0]]}",
+                  "{sets=[[0, 8, 16]], rotations=8, step_period_s=0.4}")),
 ])  # fmt: skip
 def test_a_pattern_that_is_refused_could_not_drive_into_the_wall_either(firing: str) -> None:
     chosen = settings(f"ring.firing={firing}")
@@ -245,7 +246,7 @@ def drive_at_random(seeds: range) -> str:
 
 
 def test_sensors_fail_at_random(measured: Callable[[str], None]) -> None:
-    measured(drive_at_random(range(2)))
+    measured(drive_at_random(range(1)))
 
 
 @pytest.mark.soak

@@ -96,7 +96,7 @@ def reboot_in_phase(reboot_s: float, down_s: float) -> tuple[float, float]:
     return stopped_s, echo_s
 
 
-@pytest.mark.parametrize("phases", [5, pytest.param(12, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("phases", [4, pytest.param(12, marks=pytest.mark.soak)])
 def test_after_a_reboot_in_any_phase_it_stands_until_re_armed(
     phases: int, measured: Callable[[str], None]
 ) -> None:  # fmt: skip

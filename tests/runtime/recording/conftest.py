@@ -32,7 +32,7 @@ def chunked_run(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture(scope="session", params=["bayes", "paper"])
+@pytest.fixture(scope="session", params=["bayes", pytest.param("paper", marks=pytest.mark.soak)])
 def edited(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the recording of a run with every kind of edit, by each method."""
     return made_once(tmp_path_factory, f"edited-{request.param}", lambda path: record_edited(path, request.param))

@@ -230,7 +230,7 @@ def disk_of(size: int) -> Iterator[None]:
 
 
 WRITING = {name: command for name, command in COMMANDS.items() if "{out}" in command}
-SLOW = ("report", "export --to rosbag2", "export --to parquet")
+SLOW = ("figures", "report", "export --to rosbag2", "export --to parquet")
 """They write by what the others do, and take most of the time."""
 
 

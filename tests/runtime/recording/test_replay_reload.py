@@ -27,7 +27,7 @@ OTHERS = {
 FASTER = "behaviors.avoid_static_obstacle.avoid_obstacle_sphere_m=1.5"
 
 
-@pytest.fixture(scope="module", params=["bayes", "paper"])
+@pytest.fixture(scope="module", params=["bayes", pytest.param("paper", marks=pytest.mark.soak)])
 def reloaded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("reloaded") / "hall.mcap"
     before = hall(f"perception.method={request.param}")

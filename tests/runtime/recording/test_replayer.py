@@ -67,6 +67,7 @@ def test_every_cycle_is_replayed_from_the_beginning(paper_run: Path) -> None:
     assert all(is_equal(step) for step in found)
 
 
+@pytest.mark.soak
 @pytest.mark.compiled
 def test_a_run_in_a_known_room_is_replayed_to_the_bit_and_drives_as_without_the_map(tmp_path: Path) -> None:
     """From the beginning and from each keyframe, one of them in the midst of a search."""

@@ -88,6 +88,7 @@ def share_in_place(summary: ReplaySummary) -> float:
     return float((away < 0.1).mean())
 
 
+@pytest.mark.soak
 @pytest.mark.compiled
 def test_walls_are_recognised_from_the_path_as_known_at_the_end() -> None:
     settings = load_settings(None).model_copy(update={"ring": RING})
@@ -98,6 +99,7 @@ def test_walls_are_recognised_from_the_path_as_known_at_the_end() -> None:
     assert shares[0] > 0.8 > 0.5 > shares[1], shares
 
 
+@pytest.mark.soak
 @pytest.mark.compiled
 def test_without_drift_its_correction_changes_nothing() -> None:
     """The map frame took quanta of a cycle, so that walls and outlines were refined in another order."""

@@ -74,7 +74,7 @@ def test_no_state_of_an_edited_run_is_refused(edited: Path, measured: Callable[[
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("method", ["bayes", "paper"])
+@pytest.mark.parametrize("method", ["bayes", pytest.param("paper", marks=pytest.mark.soak)])
 def test_no_state_among_irregular_objects_is_refused(method: str) -> None:
     settings = load_settings("irregular", [f"perception.method={method}"], models=("box", "semicircle"))
     assert settings.world is not None
@@ -122,8 +122,8 @@ def test_no_state_with_correction_of_drift_is_refused() -> None:
 @pytest.mark.boundslong
 @pytest.mark.parametrize(
     ("place", "grid", "method"),
-    [("room", "off", "paper"), ("drift", "directed", "bayes"), ("room", "moravec_elfes", "bayes"),
-     ("drift", "elfes", "bayes")],
+    [("drift", "directed", "bayes"), *(pytest.param(*one, marks=pytest.mark.soak) for one in
+     [("room", "off", "paper"), ("room", "moravec_elfes", "bayes"), ("drift", "elfes", "bayes")])],
 )  # fmt: skip
 def test_no_state_with_a_place_and_a_grid_is_refused_and_a_poisoned_one_is_harmless(
     place: str, grid: str, method: str
@@ -163,7 +163,7 @@ def test_no_state_with_a_place_and_a_grid_is_refused_and_a_poisoned_one_is_harml
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("method", ["bayes", "paper"])
+@pytest.mark.parametrize("method", ["bayes", pytest.param("paper", marks=pytest.mark.soak)])
 def test_no_state_with_faulty_sensors_is_refused(method: str) -> None:
     settings = load_settings("hallway", [f"perception.method={method}"], models=("box",))
     assert settings.world is not None

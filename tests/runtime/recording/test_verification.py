@@ -77,6 +77,7 @@ def test_a_replay_in_another_process_is_the_run_to_the_bit(run: Path, tmp_path: 
         assert found["cycles"] >= 20 * (SECONDS - since)
 
 
+@pytest.mark.soak
 @pytest.mark.compiled
 def test_a_replay_by_the_papers_method_is_the_run_to_the_bit(tmp_path: Path) -> None:
     path = tmp_path / "paper.mcap"

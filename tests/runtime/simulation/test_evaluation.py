@@ -116,6 +116,7 @@ def held_out() -> list[SeedOutcome]:
     return [run_seed(*settings_of("irregular"), seed) for seed in HELD_OUT]
 
 
+@pytest.mark.soak
 @pytest.mark.compiled
 def test_seven_of_eight_drums_of_the_irregular_hallway_on_seeds_that_were_held_out(
     held_out: list[SeedOutcome],

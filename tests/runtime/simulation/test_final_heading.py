@@ -60,7 +60,7 @@ def check(found: tuple[float, float, float], place: tuple[float, float, float]) 
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("robot", ["denning", "p3dx"])
+@pytest.mark.parametrize("robot", ["p3dx", pytest.param("denning", marks=pytest.mark.soak)])
 def test_a_goal_is_left_with_its_final_heading(robot: str) -> None:
     goal = GoalConfig(x_m=0.6, y_m=0.2, heading_deg=-120.0)
     found = stands(settings_of(robot, goal=goal), 14.0)

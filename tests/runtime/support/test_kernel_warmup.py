@@ -323,10 +323,16 @@ def added_in(script: str, *words: str) -> str:
 @pytest.mark.parametrize(
     ("sets", "models", "further"),
     [
-        pytest.param("perception.method=bayes", "semicircle", "keg.toml", marks=pytest.mark.soak),  # with drift, too
-        ("perception.method=bayes", "semicircle box", "hexagon.toml"),
-        ("perception.localization.correct_drift=true", "semicircle", "keg.toml"),
-        ("perception.method=paper", "semicircle", "box"),
+        ("perception.method=bayes perception.localization.correct_drift=true", "semicircle box", "hexagon.toml"),
+        *(
+            pytest.param(*row, marks=pytest.mark.soak)
+            for row in [
+                ("perception.method=bayes", "semicircle", "keg.toml"),
+                ("perception.method=bayes", "semicircle box", "hexagon.toml"),
+                ("perception.localization.correct_drift=true", "semicircle", "keg.toml"),
+                ("perception.method=paper", "semicircle", "box"),
+            ]
+        ),
     ],
 )
 def test_no_kernel_is_compiled_or_loaded_while_the_robot_drives_and_a_person_edits(

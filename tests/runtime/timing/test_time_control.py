@@ -179,7 +179,7 @@ def test_a_step_pauses_a_run_that_is_not_paused(monkeypatch: pytest.MonkeyPatch)
     assert summary["stop_reasons"] == []
 
 
-@pytest.mark.parametrize(("factor", "count"), [(0.1, 40), (3.0, 100), (10.0, 100)])
+@pytest.mark.parametrize(("factor", "count"), [(0.1, 40), pytest.param(3.0, 100, marks=pytest.mark.soak), (10.0, 60)])
 def test_another_speed_changes_nothing_else(monkeypatch: pytest.MonkeyPatch, factor: float, count: int) -> None:
     with pausable_run(monkeypatch) as it:
 
@@ -203,7 +203,7 @@ def test_another_speed_changes_nothing_else(monkeypatch: pytest.MonkeyPatch, fac
     assert sum(gaps) / len(gaps) == pytest.approx(CYCLE_S, rel=0.05)
 
 
-@pytest.mark.parametrize("hold_s", [0.01, 3.0])
+@pytest.mark.parametrize("hold_s", [pytest.param(0.01, marks=pytest.mark.soak), 3.0])
 def test_fast_motion_waits_for_a_slow_process(monkeypatch: pytest.MonkeyPatch, hold_s: float) -> None:
     """A machine that cannot keep up with ten times real time is slower, and no reason to stop."""
     with pausable_run(monkeypatch) as it:
@@ -287,7 +287,7 @@ def test_a_hanging_emulator_is_reported_and_the_run_stops_for_its_silence(monkey
     assert "nothing received for" in summary["stop_reasons"][0]
 
 
-@pytest.mark.parametrize("when", ["running", "paused", "pausing"])
+@pytest.mark.parametrize("when", ["running", "pausing", pytest.param("paused", marks=pytest.mark.soak)])
 def test_an_emulator_that_ends_is_reported_and_the_run_goes_on_to_its_stop(
     monkeypatch: pytest.MonkeyPatch, when: str
 ) -> None:
@@ -312,7 +312,7 @@ def test_an_emulator_that_ends_is_reported_and_the_run_goes_on_to_its_stop(
     assert summary["stop_reasons"]
 
 
-@pytest.mark.parametrize("rounds", [60, pytest.param(250, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("rounds", [25, pytest.param(250, marks=pytest.mark.soak)])
 def test_random_commands(monkeypatch: pytest.MonkeyPatch, rounds: int) -> None:
     """Four requests at once in any order: the robot drives on and no echo is lost."""
     import random

@@ -41,6 +41,7 @@ def test_the_posterior_equals_its_oracle(examples: int) -> None:
         assert fields[5:] == pytest.approx([spread[0, 0], spread[0, 1], spread[1, 1]], abs=1e-10)
 
 
+@pytest.mark.soak
 @pytest.mark.compiled
 def test_the_posterior_beats_least_squares_where_ranges_are_only_rounded() -> None:
     """Sixty rounded but otherwise perfect ranges all round a drum: the posterior's mean against the robust fit."""

@@ -21,7 +21,7 @@ from perception.pipeline import Perception
 from runtime.simulation.open_loop import perceive
 from runtime.simulation.scenes import halls, readings
 
-pytestmark = pytest.mark.compiled
+pytestmark = [pytest.mark.compiled, pytest.mark.soak]  # to compile its kernels for Python takes 18 s
 
 FT = 0.3048
 SETTINGS = load_settings("hallway", ["perception.method=bayes"], models=("semicircle", "box"))

@@ -100,7 +100,8 @@ def test_the_evidence_is_greater_at_the_true_pose_than_beside_it(examples: int) 
 
 
 @pytest.mark.compiled
-@examples(50, 150)
+@pytest.mark.soak
+@pytest.mark.parametrize("examples", [50, 150])
 def test_a_search_finds_the_pose_however_often_it_is_interrupted(examples: int) -> None:
     """From 3 cm and 3° beside it, to a third of the resolution, the width of the likelihood's plateau."""
     rng = np.random.default_rng(4)

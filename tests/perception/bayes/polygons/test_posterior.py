@@ -41,7 +41,7 @@ from tests.perception.bayes.box_readings import (
     heard,
     random_pose,
 )
-from tests.perception.bayes.random_tracks import examples, numbers, readings_of
+from tests.perception.bayes.random_tracks import numbers, readings_of
 
 
 def test_the_moments_of_a_lattice_equal_numpys() -> None:
@@ -98,7 +98,8 @@ def spread_of(memory: Memory, w: Floats, pose: Floats, left: int, noise: int = L
 
 
 @pytest.mark.compiled
-@examples(100, 300)
+@pytest.mark.soak
+@pytest.mark.parametrize("examples", [100, 300])
 @pytest.mark.parametrize("rule", [0, 1], ids=["mirror", "cone"])
 def test_the_covariance_is_honest(rule: int, examples: int) -> None:
     """The 95 % ellipses of position and pose hold 95 % of the true poses of noisy boxes, or a little more.

@@ -46,7 +46,7 @@ def walls_after(world: WorldConfig, path: Floats, memory: Memory) -> Floats:
     return wall_ends(memory)
 
 
-@pytest.mark.parametrize("model", ["specular", pytest.param("cone", marks=pytest.mark.compiled)])
+@pytest.mark.parametrize("model", ["specular", pytest.param("cone", marks=[pytest.mark.compiled, pytest.mark.soak])])
 def test_each_wall_of_a_room_is_found_once_and_its_doorway_stays_open(model: Reflection) -> None:
     acoustics = AcousticsConfig(model=model, noise_relative=0.01, dropout=0.05, outliers=0.03, outlier_max_m=5.0)
     world = WorldConfig(

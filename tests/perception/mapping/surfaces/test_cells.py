@@ -22,7 +22,6 @@ from perception.mapping.surfaces.records import BLOCK, CellCounts, KeptReading, 
 from perception.records import Records, array_of, records, zeros
 from perception.shared_numbers import SILENCE_M
 
-pytestmark = pytest.mark.compiled
 HALF = math.radians(12.0)
 COUNTS = ("hits", "all_hits", "passes", "all_passes")
 
@@ -37,8 +36,8 @@ def some(count: int, seed: int = 1) -> Records[KeptReading]:
     return records(KeptReading, array)
 
 
-@pytest.mark.parametrize("half_deg", [5.0, 12.0, 30.0, 45.0])
-@pytest.mark.parametrize("range_m", [0.6, 2.0, 5.0, 1e6])
+@pytest.mark.parametrize("half_deg", [12.0, 45.0])
+@pytest.mark.parametrize("range_m", [0.6, 5.0, 1e6])
 def test_passes_are_the_cells_of_the_beam_before_the_range(half_deg: float, range_m: float) -> None:
     counts = zeros(CellCounts, 1)
     readings = some(5)
@@ -72,10 +71,10 @@ def naive_probability(hits: np.ndarray, passes: np.ndarray, i: int, j: int, b: i
 
 
 def test_an_echo_is_shared_as_the_map_says() -> None:
-    counts, readings = zeros(CellCounts, 1), some(300)
+    counts, readings = zeros(CellCounts, 1), some(100)
     view = records(CellCounts, counts)[0]
-    cells.enter_readings(view, readings, 0, 299, 0, HALF)
-    q = readings[299]
+    cells.enter_readings(view, readings, 0, 99, 0, HALF)
+    q = readings[99]
     q.range_m = 2.0
     hits, passes = (counts[name][0].transpose(1, 2, 0) for name in ("hits", "passes"))
     hits, passes = hits / WHOLE, passes / WHOLE_PASS
@@ -95,17 +94,17 @@ def test_an_echo_is_shared_as_the_map_says() -> None:
 
 def test_what_a_reading_has_put_there_can_be_taken_away_and_made_again() -> None:
     counts, local = zeros(CellCounts, 1), zeros(LocalMap, 1)
-    local["readings"][0, :200] = array_of(some(200))
-    local["entered"] = 200
+    local["readings"][0, :60] = array_of(some(60))
+    local["entered"] = 60
     view, rooms = records(CellCounts, counts)[0], records(LocalMap, local)
     readings = rooms[0].readings
-    cells.enter_readings(view, readings, 0, 200, 0, HALF)
-    cells.share_again(view, readings, 0, 200, HALF)
+    cells.enter_readings(view, readings, 0, 60, 0, HALF)
+    cells.share_again(view, readings, 0, 60, HALF)
     again = zeros(CellCounts, 1)
     cells.make_again(rooms, records(CellCounts, again), HALF)
     for name in COUNTS:
         np.testing.assert_array_equal(again[name], counts[name])
-    for k in range(200):
+    for k in range(60):
         cells.enter_passes(view, readings[k], HALF, -1)
         if readings[k].range_m <= REACH_M:
             cells.lay_arc(view, readings[k], HALF)
@@ -114,19 +113,19 @@ def test_what_a_reading_has_put_there_can_be_taken_away_and_made_again() -> None
 
 
 def test_readings_that_are_carried_over_keep_their_shares() -> None:
-    array = zeros(KeptReading, 200)
-    array[...] = array_of(some(200))
+    array = zeros(KeptReading, 60)
+    array[...] = array_of(some(60))
     array["shares"][:, 0] = 100  # the whole echo at the first place
-    cells.enter_readings(records(CellCounts, zeros(CellCounts, 1))[0], records(KeptReading, array), 0, 200, 150, HALF)
+    cells.enter_readings(records(CellCounts, zeros(CellCounts, 1))[0], records(KeptReading, array), 0, 60, 40, HALF)
     is_echo = array["range_m"] <= REACH_M
-    assert (array["shares"][:150] == (100, 0, 0)).all()
-    assert (array["shares"][150:][is_echo[150:]] != (100, 0, 0)).any(axis=1).all()
+    assert (array["shares"][:40] == (100, 0, 0)).all()
+    assert (array["shares"][40:][is_echo[40:]] != (100, 0, 0)).any(axis=1).all()
 
 
 def test_a_bound_of_strength_and_the_hits_of_blocks() -> None:
     counts = zeros(CellCounts, 1)
     view = records(CellCounts, counts)[0]
-    cells.enter_readings(view, some(2000), 0, 2000, 0, HALF)
+    cells.enter_readings(view, some(100), 0, 100, 0, HALF)
     every = counts["all_hits"][0]
     blocks = every.reshape(CELLS // BLOCK, BLOCK, CELLS // BLOCK, BLOCK).sum(axis=(1, 3))
     np.testing.assert_array_equal(counts["block_hits"][0], blocks)
@@ -136,7 +135,7 @@ def test_a_bound_of_strength_and_the_hits_of_blocks() -> None:
         for i, j in zip(rows, columns, strict=True)
     ]
     assert all(strength <= most + 1e-12 for strength, most in strengths)
-    assert sum(strength > 0.0 for strength, _ in strengths) > 100
+    assert sum(strength > 0.0 for strength, _ in strengths) > 20
     cells.clear_cells(view, 0, CELLS // BLOCK)
     assert not any(counts[name].any() for name in (*COUNTS, "block_hits"))
 

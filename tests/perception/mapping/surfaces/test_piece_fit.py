@@ -13,7 +13,6 @@ from perception.mapping.surfaces.piece_fit import group_echoes, judge
 from perception.mapping.surfaces.records import FREE, CellCounts, LocalMap
 from perception.records import Structured, records, zeros
 
-pytestmark = pytest.mark.compiled
 RADII = np.array([0.107, 0.29, 0.671])
 
 

@@ -32,8 +32,6 @@ from perception.mapping.surfaces.pieces import (
 from perception.mapping.surfaces.records import ANGLES, BLOCK, FREE, CellCounts, LocalMap
 from perception.records import Records, Structured, records, zeros
 
-pytestmark = pytest.mark.compiled
-
 
 def mapped(points: Floats, echoes: float = 3.0) -> tuple[Records[LocalMap], Structured, Structured]:
     """Return a map, in two views, whose cells at some places (m from the centre) have been heard, and its counts."""

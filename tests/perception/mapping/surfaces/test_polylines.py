@@ -23,8 +23,6 @@ from perception.mapping.surfaces.records import CHAIN_MAX, FREE, NODE, CellCount
 from perception.records import records
 from tests.perception.mapping.surfaces.test_pieces import mapped
 
-pytestmark = pytest.mark.compiled
-
 
 def chains(points: np.ndarray, echoes: float = 3.0) -> list[np.ndarray]:
     """Return the polylines through places that were heard, as places (m)."""

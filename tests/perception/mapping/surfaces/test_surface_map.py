@@ -256,7 +256,7 @@ def is_refused(surfaces: SurfaceMap, name: str, number: float, firings: list[Fir
     return False
 
 
-@pytest.mark.boundscheck
+@pytest.mark.boundslong
 @pytest.mark.parametrize("share", [6, pytest.param(1, marks=pytest.mark.soak)])
 def test_each_number_has_a_bound_within_which_it_is_harmless(moments: list[SurfaceMap], share: int) -> None:
     """A state from a file may have any value within the bounds: no kernel leaves an array for it.

@@ -107,6 +107,7 @@ def test_walls_are_numbered_and_counted(shown: str) -> None:
     assert "recognised wall, its number" in shown
 
 
+@pytest.mark.soak
 def test_polylines_are_counted_and_drawn(shown: str) -> None:
     assert "polyline" not in shown
     with_one = run_page(with_polyline(synthetic_timeline()), "m")

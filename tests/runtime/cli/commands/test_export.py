@@ -41,6 +41,7 @@ def test_a_recording_as_a_ring_log(hall_run: Path, tmp_path: Path, capsys: pytes
     assert capsys.readouterr().out == f"{path}: {count} firings\n"
 
 
+@pytest.mark.soak
 def test_a_ring_log_in_every_format(hall_log: Path, tmp_path: Path) -> None:
     """It has no odometry, no modes and no Unix time."""
     source = TimelineSource(str(hall_log), ["perception.method=paper"], world="hallway")

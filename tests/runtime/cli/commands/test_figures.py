@@ -33,6 +33,7 @@ def test_every_figure_of_a_recording_and_its_animation(
     assert "cluster-4-centre" in ids_in(shown["clusters"])
 
 
+@pytest.mark.soak
 def test_a_still_run_has_no_animation(hall_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Drawn from a ring log, whose world is not known; one format is enough to see that."""
     monkeypatch.setattr("runtime.analysis.plots.figure_files.FORMATS", ("svg",))

@@ -31,8 +31,8 @@ from tests.runtime.console.console_case import FREE_PORT, ConsoleCase, open_cons
 from tests.runtime.console.sample_messages import ALL
 from tests.runtime.virtual_time import in_virtual_time
 
-TO_DISPATCHER, SOAK_TO_DISPATCHER = 5000, 70_000
-OVER_WEBSOCKET, SOAK_OVER_WEBSOCKET = 1000, 30_000
+TO_DISPATCHER, SOAK_TO_DISPATCHER = 2000, 70_000
+OVER_WEBSOCKET, SOAK_OVER_WEBSOCKET = 400, 30_000
 IN_A_RUN = 2000
 BOUNDLESS = Limits(messages_per_s=1e9, bytes_burst=1e12, queue_messages=10**9, queue_bytes=10**12)
 

@@ -109,6 +109,7 @@ async def test_a_recording_is_opened_moved_and_closed(folder: Path) -> None:
         assert len(page.frames) == count
 
 
+@pytest.mark.soak
 async def test_a_recording_with_refused_keyframes_is_played_and_they_are_named(folder: Path, tmp_path: Path) -> None:
     spoil(folder / "hall.mcap", tmp_path / "spoiled.mcap", range(100))
     page = Page()

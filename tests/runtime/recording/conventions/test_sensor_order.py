@@ -112,7 +112,7 @@ def test_a_small_gain_among_mirrors_is_no_exchange(seed: int, robot: str) -> Non
     assert found is None or found.surely <= 0.0
 
 
-@pytest.mark.parametrize("name", ["corridor", "ring24"])
+@pytest.mark.parametrize("name", ["corridor", pytest.param("ring24", marks=pytest.mark.soak)])
 def test_real_recordings_are_in_their_order(name: str) -> None:
     robot, rows = recording(name)
     ranges = np.array([row.ranges_m for row in rows])

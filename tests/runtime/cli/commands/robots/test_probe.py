@@ -54,7 +54,10 @@ def test_runs_on_the_local_network_are_listed(
 @pytest.mark.realtime
 @pytest.mark.parametrize(
     ("robot", "said"),
-    [("denning", "24 sensors; battery not reported; "), ("p3at", "16 sensors; battery 12.6 V; ")],
+    [
+        pytest.param("denning", "24 sensors; battery not reported; ", marks=pytest.mark.soak),
+        ("p3at", "16 sensors; battery 12.6 V; "),
+    ],
 )
 @stalls_excused
 def test_a_robot_is_named_and_does_not_move(
