@@ -43,7 +43,7 @@ LIMITS: Sequence[str] = (
     "are exchanged. In a ring of more sensors they are not named at all. One of eight or fewer that is turned "
     "otherwise, and a ring that is turned while it drives: of a `hobby8` in a room and a corridor 1 of 8 drives "
     "touched something above 0.05 m/s, turned by 45°, 4 of 8 by 90° and 5 of 8 by 180°, at up to 0.3 m/s, and of a "
-    "`p3dx` 0, 1 and 2 of 8; 20 and 14 of the 24 were not named. Mounted so from "
+    "`p3dx` 0, 1 and 2 of 8; 20 and 15 of the 24 were not named. Mounted so from "
     "the start (by a half, as a Pioneer is whose two arrays are exchanged), the robot is slow where something would"
     " be ahead, until the motion has excluded that: among close furniture and in corridors six robots touched "
     "something above 0.05 m/s in 6 of 168 drives of 20 s, at up to 0.26 m/s, five of them with eight sensors, which "

@@ -180,7 +180,9 @@ def compare(
             continue
         one.low, one.high = expect(one.source, i, 0.0, half_angle, tolerance, mounts, echoes)
         turned = abs(wrapped(echoes[i].latest.axis - then.axis))
-        one.missed = missed[1 if turned > TURNING_SHARE * half_angle else 0]
+        # Mirrors leave a beam in proportion to its turn; the learned share is of turns beyond this one.
+        part = 1.0 if turned > TURNING_SHARE * half_angle else 0.5 * turned / (TURNING_SHARE * half_angle)
+        one.missed = (1.0 - part) * missed[0] + part * missed[1]
         one.honest_nat = math.log(density(r, one.low, one.high, reach, one.missed))
         is_known = one.high >= 0.0 and one.low <= reach
         one.is_off = 1 if is_known and r >= 0.0 and not one.low <= r <= one.high else 0

@@ -154,8 +154,10 @@ def test_a_robot_that_turns_fast_among_mirrors_hears_other_surfaces_at_once() ->
     """Turned by most of its beam, an AmigoBot heard as much elsewhere as the shares of misses of a turn expect."""
     turned = looks(ROOM, np.roll(ROOM, -4), 0.0, 0.8 * HALF)
     assert weighed(turned, turning=0.4)[1] < 0.7 * weighed(turned)[1]
-    steady = looks(ROOM, np.roll(ROOM, -4), 0.0, 0.1 * HALF)
+    steady = looks(ROOM, np.roll(ROOM, -4), 0.0)
     assert weighed(steady, turning=0.4) == weighed(steady)
+    nats = [weighed(looks(ROOM, np.roll(ROOM, -4), 0.0, share * HALF), turning=0.4)[1] for share in (0.05, 0.2)]
+    assert weighed(steady)[1] > nats[0] > nats[1], "mirrors leave a beam in proportion to its turn"
 
 
 def test_what_was_heard_too_long_ago_or_not_twice_says_nothing() -> None:
