@@ -178,7 +178,11 @@ def in_session(name: str) -> Device:
 SENDERS = {"p3dx": "frames of a Pioneer", "denning": "frames of a Denning", "b21r": "frames of a robot with an rFLEX"}
 
 
-@pytest.mark.parametrize(("name", "other"), list(itertools.permutations(FAMILIES, 2)))
+@pytest.mark.parametrize(
+    ("name", "other"),
+    [pytest.param(*pair, marks=[pytest.mark.soak] if k % 2 else []) for k, pair in
+     enumerate(itertools.permutations(FAMILIES, 2))],
+)  # fmt: skip
 def test_a_robot_of_another_family_is_named(name: str, other: str) -> None:
     said = said_of(in_session(other), robot_at(name, "socket://robot:8101"))
     assert SENDERS[other] in said[-1][2]

@@ -131,7 +131,7 @@ def test_a_calibrated_robot_is_no_worse_than_its_file(kind: str, has_way: bool, 
 @pytest.mark.parametrize(
     ("kind", "seed"),
     [
-        ("glimpse", 2), pytest.param("turn", 3, marks=pytest.mark.soak),
+        *(pytest.param(*one, marks=pytest.mark.soak) for one in (("glimpse", 2), ("turn", 3))),
         *(pytest.param(kind, seed, marks=pytest.mark.soak) for kind in sorted(FURNISHED) for seed in range(3, 12)),
     ],
 )  # fmt: skip

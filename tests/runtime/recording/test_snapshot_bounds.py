@@ -41,7 +41,7 @@ from tests.runtime.recording.moments import (
     moments_of,
 )
 
-CHECKED_EVERY = 16
+CHECKED_EVERY = 26
 """Cycles from one check of an honest state to the next."""
 SERVO_CYCLE = 200
 """By then the robot has driven past what its sensor hears."""

@@ -256,7 +256,7 @@ UNPREPARED = """
 from tests.runtime.emulated_run import Run
 
 run = Run(settings, settings.world, 3, (), preparing="not at all")
-run.until(20.0)
+run.until(10.0)
 assert run.mode is Mode.DRIVE and run.truths[-1].pose.x > 0.0, run.state.mode
 print(*sorted(signatures() - before))
 """
@@ -303,7 +303,7 @@ def to_goal(cycle, state):
     arm = Request.ARM if state.mode.mode is Mode.READY else None
     return OperatorInput(arm, Goal(10.0, 0.0) if cycle == 20 else None)
 
-run = simulate(settings, settings.world, 0, 30.0, operator=to_goal)
+run = simulate(settings, settings.world, 0, 15.0, operator=to_goal)
 assert run.state.goal_drive.search.way, run.state
 print(*sorted(signatures() - before))
 """

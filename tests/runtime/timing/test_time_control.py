@@ -179,7 +179,10 @@ def test_a_step_pauses_a_run_that_is_not_paused(monkeypatch: pytest.MonkeyPatch)
     assert summary["stop_reasons"] == []
 
 
-@pytest.mark.parametrize(("factor", "count"), [(0.1, 40), pytest.param(3.0, 100, marks=pytest.mark.soak), (10.0, 60)])
+@pytest.mark.parametrize(
+    ("factor", "count"),
+    [pytest.param(0.1, 40, marks=pytest.mark.soak), pytest.param(3.0, 100, marks=pytest.mark.soak), (10.0, 60)],
+)
 def test_another_speed_changes_nothing_else(monkeypatch: pytest.MonkeyPatch, factor: float, count: int) -> None:
     with pausable_run(monkeypatch) as it:
 

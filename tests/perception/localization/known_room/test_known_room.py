@@ -78,7 +78,7 @@ def in_a_symmetric_room(seed: int, acoustics: AcousticsConfig) -> KnownDrive:
 
 
 @pytest.mark.promise("P36")
-@pytest.mark.parametrize("reflection", ["cone", "specular"])
+@pytest.mark.parametrize("reflection", [pytest.param("cone", marks=pytest.mark.soak), "specular"])
 @pytest.mark.parametrize("seeds", SEEDS)
 @pytest.mark.parametrize("case", [carried, beside_a_moved_wall, with_another_map, in_a_symmetric_room])
 def test_no_wrong_place_is_sure(

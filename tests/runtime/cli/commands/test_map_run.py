@@ -65,6 +65,7 @@ def test_a_polyline_is_on_the_map_as_its_pieces_of_wall(
     assert (np.min(beside, axis=0) == 0).all(), "occupied"
 
 
+@pytest.mark.soak
 def test_the_image_is_drawn_by_the_method_that_the_settings_name(hall_log: Path, tmp_path: Path) -> None:
     images, log = {}, beginning(hall_log, tmp_path)
     for method in ("directed", "elfes"):
