@@ -81,8 +81,9 @@ def test_a_doorway_parts_a_wall_and_a_corner_parts_two() -> None:
     np.testing.assert_allclose(pieces["high"] - pieces["low"], [1.6, 1.6, 1.5], atol=0.15)
 
 
-def test_parallel_surfaces_ten_centimetres_apart_are_two() -> None:
-    pieces = grown(np.concatenate([line(-1.0, 0.0, 1.0, 0.0), line(-0.3, 0.15, 0.9, 0.15)]))
+@pytest.mark.parametrize("at", [0.0, 0.02, 0.04])
+def test_parallel_surfaces_ten_centimetres_apart_are_two(at: float) -> None:
+    pieces = grown(np.concatenate([line(-1.0, at, 1.0, at), line(-0.3, at + 0.1, 0.9, at + 0.1)]))
     np.testing.assert_allclose(pieces["high"] - pieces["low"], [2.0, 1.2], atol=0.15)
 
 
