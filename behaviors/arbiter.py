@@ -124,7 +124,8 @@ def arbitrate(
     w = max(-body.turn_max_rad_s, min(body.turn_max_rad_s, w))
     seen = seen_speed_m_s(percept, body, config.clearance_m, w)
     if seen == 0.0 and (unseen := _unseen_ways(percept, course, body, config)) is not None:
-        remedy = "check the ring's cables and what covers it" if unseen.sensors else "mount sensors whose beams do"
+        cables, mounting = "check the ring's cables and what covers it", "mount sensors whose beams cover the way"
+        remedy = cables if unseen.sensors else mounting
         return Unseen(f"{unseen.reason}; {remedy}, then re-arm", unseen.age_s, unseen.sensors)
     stoppable = stoppable_speed_m_s(percept, body, config.clearance_m, config.cautious_velocity_m_s)
     v = min(speed, body.speed_max_m_s, stoppable, seen)

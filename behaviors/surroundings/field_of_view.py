@@ -137,7 +137,14 @@ def unseen_way(percept: Percept, direction_rad: float, body: BodyConfig, clearan
     lasting = f"for {age_s:.1f} s" if math.isfinite(age_s) else "yet"
     looks_there = np.abs(turn(direction_rad, view.axes_rad)) < half_angle + view.half_angle_rad
     missing = np.flatnonzero(looks_there & ~(view.sensor_ages_s < view.age_max_s)).tolist()
-    cause = f"no usable range from sensor {listed(missing)}" if missing else "no sensor of the ring looks there"
+    if missing:
+        cause = f"no usable range from sensor {listed(missing)}"
+    elif looks_there.any():
+        cause = (
+            f"the beams of sensor {listed(np.flatnonzero(looks_there).tolist())} leave parts of the body's way out"
+        )
+    else:
+        cause = "no sensor of the ring looks there"
     return UnseenWay(f"the ring has not looked {where} {lasting}: {cause}", age_s, tuple(missing))
 
 

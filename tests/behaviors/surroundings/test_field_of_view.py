@@ -158,7 +158,16 @@ def test_the_time_until_a_turning_path_is_unseen_agrees_with_the_oracle() -> Non
         ),
         (
             ring_view(NEW, half_angle_deg=5.0), 0.5,
-            "the ring has not looked 29° to the left of the heading yet: no sensor of the ring looks there",
+            "the ring has not looked 29° to the left of the heading yet: "
+            "the beams of sensor 0, 1, 2, 3, 4, 5, 23 leave parts of the body's way out",
+        ),
+        (
+            ring_view(NEW[:1]), 0.0,
+            "the ring has not looked ahead yet: the beams of sensor 0 leave parts of the body's way out",
+        ),
+        (
+            ring_view(NEW[:1]), 3.0,
+            "the ring has not looked 172° to the left of the heading yet: no sensor of the ring looks there",
         ),
     ],
 )  # fmt: skip
