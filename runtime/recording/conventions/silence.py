@@ -205,26 +205,28 @@ def _candidates(moved: Floats, finite_moved: Floats, beams: Beams) -> Iterator[t
     second = int(np.delete(counts, most).max(initial=1))
     if counts[most] > max(MODE_FACTOR * second, MODE_SHARE * len(finite_moved)):
         noisy = top or noisy_about(value.centre, finite_moved)
-        if (
-            noisy is not None
-            and noisy.low <= value.centre <= noisy.high
-            and np.count_nonzero(noisy.inside(finite_moved)) > (1.0 + NOISY_SHARE) * counts[most]
-        ):
-            value = noisy
-        yield value, BAND_CONTRAST
+        yield noisy if noisy is not None and _has_noise(value.centre, noisy, finite_moved) else value, BAND_CONTRAST
     if top is not None:
         yield top, BAND_CONTRAST
     if (spikes := find_spikes(moved)) is not None:
         yield spikes, BAND_CONTRAST
     last = float(values[-1])
     beside = np.count_nonzero((finite_moved < last) & (finite_moved > (1.0 - BESIDE) * last))
-    if counts[-1] >= max(ELSEWHERE_MIN, DOUBTFUL * beside) and beams.is_greatest(last):
+    is_frequent = counts[-1] >= max(ELSEWHERE_MIN, DOUBTFUL * beside) and beams.is_greatest(last)
+    if is_frequent and not (top is not None and _has_noise(last, top, finite_moved)):  # the band has been judged
         yield Ceiling.exactly(last), BAND_CONTRAST
     if (doubtful := doubtful_top(lone, finite_moved)) is not None:
         yield doubtful, DOUBTFUL
     for widest in (BAND, WIDE_BAND):
         if (wide := unlike_wall(find_band(finite_moved, GLITCHES, widest, DOUBTFUL), moved)) is not None:
             yield wide, DOUBTFUL
+
+
+def _has_noise(value: float, band: Ceiling, finite: Floats) -> bool:
+    """Return whether a band holds, of ranges (n,), a value and others, too."""
+    exact = np.count_nonzero(finite == value)
+    is_within = band.low <= value <= band.high
+    return is_within and bool(np.count_nonzero(band.inside(finite)) > (1.0 + NOISY_SHARE) * exact)
 
 
 def check_near(ranges: Floats, unit_m: float, range_min_m: float, silence: str) -> None:

@@ -59,6 +59,12 @@ def test_silence_that_is_hard_to_see_is_never_wrong_without_a_word(kind: str, se
     assert word != "wrong", found
 
 
+def test_a_noisy_wall_that_ends_at_the_greatest_range_is_no_silence() -> None:
+    """At one angle to the way, 20 echoes were rounded to 5.00 m and 6 to 4.99 m; farther ones were not heard."""
+    word, _ = found = outcome(silence_table("noisy-corridor", 6035))
+    assert word == "right", found
+
+
 @pytest.mark.soak
 def test_many_tables_whose_silence_is_hard_to_see() -> None:
     """Of walls in a corridor and rooms of echoes alone, none is refused for its silence."""
