@@ -70,6 +70,19 @@ def naive_probability(hits: np.ndarray, passes: np.ndarray, i: int, j: int, b: i
     return float((blurred[b] + prior) / (blurred[b] + went[b] + 1.0))
 
 
+def test_a_cell_answers_as_it_and_those_around_it_did() -> None:
+    counts, rng = zeros(CellCounts, 1), np.random.default_rng(3)
+    counts["hits"][0, :, 40:48, 40:48] = rng.integers(0, 3 * WHOLE, (DIRECTIONS, 8, 8))
+    counts["passes"][0, :, 20:24, 20:24] = rng.integers(0, 5 * WHOLE_PASS, (DIRECTIONS, 4, 4))
+    for name in ("hits", "passes"):
+        counts[f"all_{name}"][0] = counts[name][0].sum(axis=0)
+    hits, passes = (counts[name][0].transpose(1, 2, 0) for name in ("hits", "passes"))
+    view = records(CellCounts, counts)[0]
+    for i, j in ((42, 43), (45, 44), (46, 41)):
+        expected = naive_probability(hits / WHOLE, passes / WHOLE_PASS, i, j, 1)
+        assert cells.answer_probability(view, i, j, 1) == pytest.approx(expected)
+
+
 def test_an_echo_is_shared_as_the_map_says() -> None:
     counts, readings = zeros(CellCounts, 1), some(100)
     view = records(CellCounts, counts)[0]
