@@ -21,7 +21,7 @@ SHORT_S = {
     "dock": 14.0, "dock-from-behind": 12.0, "guard": 12.0, "inspect-drums": 14.0, "mow": 12.0, "patrol": 20.0,
     "round-the-room": 14.0, "stay-on-path": 21.0, "there-and-back": 22.0, "wander": 12.0,
 }  # fmt: skip
-OF_EACH_KIND = ("dock", "patrol")
+OF_EACH_KIND = ("dock", "guard", "patrol")
 """Those which the quick form drives: with drums to recognise and without."""
 LONG_S = {"round-the-room": 150.0, "inspect-drums": 150.0, "wander": 125.0, "patrol": 120.0}
 NEEDS_DRUMS = {"dock", "dock-from-behind", "guard", "inspect-drums"}
