@@ -180,7 +180,8 @@ def compare(
             continue
         one.low, one.high = expect(one.source, i, 0.0, half_angle, tolerance, mounts, echoes)
         turned = abs(wrapped(echoes[i].latest.axis - then.axis))
-        # Mirrors leave a beam in proportion to its turn; the learned share is of turns beyond this one.
+        # Mirrors leave a beam as it turns. The learned share is of turns beyond the limit; below it, up to half of it
+        # counts: all of it hid rings that are turned.
         part = 1.0 if turned > TURNING_SHARE * half_angle else 0.5 * turned / (TURNING_SHARE * half_angle)
         one.missed = (1.0 - part) * missed[0] + part * missed[1]
         one.honest_nat = math.log(density(r, one.low, one.high, reach, one.missed))

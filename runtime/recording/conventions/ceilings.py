@@ -34,7 +34,8 @@ LEAST_STEPS: Final = 0.02
 CUT_SHARE: Final = 0.1
 """Least share of a band whose values are all its greatest one where noise above that is cut off."""
 CUT_NAT: Final = 3.0
-"""By how much likelier noise that is cut off must be than one exact value."""
+"""By how much likelier noise that is cut off must be than one exact value. With 20 one of 24 made tables loses 133 of
+its 299 silences and nothing is said; with 3 a wall just below an exact value is often taken for its noise."""
 ROUNDS: Final = 30
 """Rounds in which a band's mean and standard deviation are fitted: they then change by less than 1 %."""
 SMOOTH: Final = 0.5
