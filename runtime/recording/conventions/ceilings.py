@@ -77,8 +77,11 @@ class Ceiling(NamedTuple):
         width = CORE * self.spread
         inside = int(np.count_nonzero(np.abs(finite - self.centre) <= width))
         below = int(np.count_nonzero((finite < self.centre - width) & (finite >= self.centre - 3.0 * width)))
-        above = np.count_nonzero(finite > self.centre + WIDTHS * self.spread)
-        return inside >= max(contrast * (1 + below), TOP_SHARE * len(finite), 10, ABOVE * above)
+        return inside >= max(contrast * (1 + below), TOP_SHARE * len(finite), 10, ABOVE * self.above(finite))
+
+    def above(self, finite: Floats) -> int:
+        """Return how many ranges, of (n,), are above it."""
+        return int(np.count_nonzero(finite > self.centre + WIDTHS * self.spread))
 
 
 def top_band(finite: Floats) -> Ceiling | None:
@@ -184,8 +187,7 @@ def noisy_about(value: float, finite: Floats) -> Ceiling | None:
 def unlike_wall(band: Ceiling | None, moved: Floats) -> Ceiling | None:
     """Return a band, but None if each sensor's readings in it change as slowly as those of a wall along the way.
 
-    Equal readings in a row count once: a table may repeat each until the next. `moved`: (rows, sensors), ranges of
-    the rows in which the robot moved.
+    `moved`: (rows, sensors), ranges of the rows in which the robot moved.
     """
     if band is None:
         return None
@@ -193,10 +195,15 @@ def unlike_wall(band: Ceiling | None, moved: Floats) -> Ceiling | None:
     for column in moved.T:
         inside = column[band.inside(column)]
         if len(inside):
-            changed = inside[np.r_[True, np.diff(inside) != 0.0]]
+            changed = _without_repeats(inside)
             steps += float(np.square(np.diff(changed)).sum())
             spread += 2.0 * len(changed) * float(changed.var())
     return None if steps < SMOOTH * spread else band
+
+
+def _without_repeats(values: Floats) -> Floats:
+    """Return the values, (n,) with n > 0, that differ from the one before: a table may repeat each until the next."""
+    return values[np.r_[True, np.diff(values) != 0.0]]
 
 
 def spread_of(near: Floats, scale: float = 1.4826) -> float:
@@ -240,14 +247,14 @@ def lone_readings(ranges: Floats) -> Floats:
     for column in ranges.T:
         values = column[np.isfinite(column)]
         if len(values):
-            values = values[np.r_[True, np.diff(values) != 0.0]]  # a table may repeat each until the next
+            values = _without_repeats(values)
             differs = np.abs(np.diff(values)) > AGREE * np.minimum(values[1:], values[:-1])
             lone.append(values[np.r_[True, differs] & np.r_[differs, True]])
     return np.concatenate(lone)
 
 
-def lone_band(lone: Floats, finite: Floats) -> Ceiling | None:
-    """Return a band at the top of lone readings that shows among all of them, too, if there is one.
+def lone_bands(lone: Floats, finite: Floats) -> tuple[Ceiling | None, Ceiling | None]:
+    """Return a band at the top of lone readings that shows among all, too, and one that is only denser than below it.
 
     Parameters
     ----------
@@ -256,30 +263,21 @@ def lone_band(lone: Floats, finite: Floats) -> Ceiling | None:
     finite : (n,) float
         All ranges.
     """
-    found = find_band(lone, GLITCHES) if len(lone) >= LEAPS_MIN else None
-    if found is None or np.count_nonzero(found.inside(lone)) < LONE_MIN:
-        return None
-    found = _ceiling(finite, found.centre, found.spread)
-    return found if found.stands_out(finite, DOUBTFUL) and _is_top(found, finite) else None
-
-
-def doubtful_top(lone: Floats, finite: Floats) -> Ceiling | None:
-    """Return the top of lone readings if they are denser there than below it; parameters as of `lone_band`."""
     if len(lone) < LEAPS_MIN:
-        return None
+        return None, None
+    sure, doubtful = None, find_band(lone, GLITCHES, BAND, DOUBTFUL)
+    if doubtful is not None and doubtful.stands_out(lone, BAND_CONTRAST):
+        found = _ceiling(finite, doubtful.centre, doubtful.spread)
+        is_shown = np.count_nonzero(doubtful.inside(lone)) >= LONE_MIN and found.stands_out(finite, DOUBTFUL)
+        sure = found if is_shown else None
     top = float(np.quantile(lone, 1.0 - FEW_GLITCHES, method="lower"))
     inside = lone[(lone > (1.0 - BAND) * top) & (lone <= top)]
     below = np.count_nonzero((lone > (1.0 - 2.0 * BAND) * top) & (lone <= (1.0 - BAND) * top))
-    found = find_band(lone, GLITCHES, BAND, DOUBTFUL)
     if len(inside) >= max(LONE_MIN, DOUBTFUL * below):
-        found = Ceiling(float(inside.min()), float(inside.max()), float(np.median(inside)), float(inside.std()))
-    return found if found is not None and _is_top(found, finite) else None
-
-
-def _is_top(band: Ceiling, finite: Floats) -> bool:
-    """Return whether hardly any range, of (n,), is above a band."""
-    above = np.count_nonzero(finite > band.centre + WIDTHS * band.spread)
-    return bool(above <= FEW_GLITCHES * len(finite))
+        doubtful = Ceiling(float(inside.min()), float(inside.max()), float(np.median(inside)), float(inside.std()))
+    few = FEW_GLITCHES * len(finite)
+    sure, doubtful = (one if one is not None and one.above(finite) <= few else None for one in (sure, doubtful))
+    return sure, doubtful
 
 
 def _ceiling(finite: Floats, centre: float, spread: float) -> Ceiling:

@@ -16,16 +16,14 @@ import numpy as np
 from drivers.messages import Floats
 from runtime.recording.conventions.beams import Beams
 from runtime.recording.conventions.ceilings import (
-    BAND,
     BAND_CONTRAST,
     DOUBTFUL,
     GLITCHES,
     TOP_SHARE,
     Ceiling,
-    doubtful_top,
     find_band,
     find_spikes,
-    lone_band,
+    lone_bands,
     lone_readings,
     noisy_about,
     top_band,
@@ -195,8 +193,8 @@ def _most_frequent(moved: Floats, finite: Floats, beams: Beams) -> Silence:
 
 def _candidates(moved: Floats, finite_moved: Floats, beams: Beams) -> Iterator[tuple[Ceiling, float]]:
     """Yield what may stand for silence, and the contrast by which it does: parameters as of `_most_frequent`."""
-    lone = lone_readings(moved)
-    bands = (unlike_wall(top_band(finite_moved), moved), lone_band(lone, finite_moved))
+    lone, doubtful = lone_bands(lone_readings(moved), finite_moved)
+    bands = (unlike_wall(top_band(finite_moved), moved), lone)
     top = max(bands, key=lambda one: 0 if one is None else np.count_nonzero(one.inside(finite_moved)))
     values, counts = np.unique(finite_moved, return_counts=True)
     counts[0] = 0  # what is too near is given as the least range, by many rings
@@ -215,11 +213,10 @@ def _candidates(moved: Floats, finite_moved: Floats, beams: Beams) -> Iterator[t
     is_frequent = counts[-1] >= max(ELSEWHERE_MIN, DOUBTFUL * beside) and beams.is_greatest(last)
     if is_frequent and not (top is not None and _has_noise(last, top, finite_moved)):  # the band has been judged
         yield Ceiling.exactly(last), BAND_CONTRAST
-    if (doubtful := doubtful_top(lone, finite_moved)) is not None:
+    if doubtful is not None:
         yield doubtful, DOUBTFUL
-    for widest in (BAND, WIDE_BAND):
-        if (wide := unlike_wall(find_band(finite_moved, GLITCHES, widest, DOUBTFUL), moved)) is not None:
-            yield wide, DOUBTFUL
+    if (wide := unlike_wall(find_band(finite_moved, GLITCHES, WIDE_BAND, DOUBTFUL), moved)) is not None:
+        yield wide, DOUBTFUL
 
 
 def _has_noise(value: float, band: Ceiling, finite: Floats) -> bool:

@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from runtime.recording.conventions.ceilings import cut_off, doubtful_top, find_band, lone_band, lone_readings
+from runtime.recording.conventions.ceilings import cut_off, find_band, lone_bands, lone_readings
 from tests.runtime.recording.conventions.silence_tables import KINDS, outcome, silence_table
 
 
@@ -46,10 +46,10 @@ def test_a_band_among_far_walls_shows_in_lone_readings() -> None:
     band = 4.8 + 0.03 * rng.standard_normal(60)
     finite = np.concatenate([rng.uniform(1.0, 4.6, 1200), band, rng.uniform(4.6, 4.85, 20)])
     lone = np.concatenate([finite[:40], band[:30]])
-    found = lone_band(lone, finite)
+    found, _ = lone_bands(lone, finite)
     assert found is not None
     assert found.centre == pytest.approx(4.8, abs=0.02)
-    assert lone_band(finite[:70], finite) is doubtful_top(finite[:70], finite) is None
+    assert lone_bands(finite[:70], finite) == (None, None)
 
 
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.soak)])
