@@ -95,6 +95,7 @@ def test_a_ring_that_lies_is_named_and_nothing_is_touched(
 ) -> None:
     monkeypatch.setattr("bench.lies.UNTIL_S", until_s)
     results = measure(drawn(RING, count, 2), lambda _: None)
+    assert any(one.is_driving for one in results), "a robot that stands would show nothing"
     assert_found(results)
     measured(summed_up(results))
 

@@ -6,6 +6,7 @@ import functools
 import math
 
 import numpy as np
+import pytest
 
 from bench.trials.furnished_rooms import DRUM_RADIUS_M
 from bench.trials.imperfect_rooms import BEND_M, CLEAR_M, MODELS, drive_through, imperfect_room
@@ -22,11 +23,12 @@ def surfaces_of(world: WorldConfig) -> set[str | None]:
     return {it.surface for kind in ("wall", "box", "drum") for it in getattr(world, kind)}
 
 
-def test_a_seed_is_one_room_whatever_it_is_heard_by() -> None:
-    for seed in SEEDS[:1]:
+@pytest.mark.parametrize(("seeds", "each"), [(1, 3), pytest.param(len(SEEDS), 1, marks=pytest.mark.soak)])
+def test_a_seed_is_one_room_whatever_it_is_heard_by(seeds: int, each: int) -> None:
+    for seed in SEEDS[:seeds]:
         mixed = mixed_room(seed).world
         assert mixed == imperfect_room(seed).world
-        for model in sorted(MODELS.keys() - {"mixture"})[::3]:
+        for model in sorted(MODELS.keys() - {"mixture"})[::each]:
             world = imperfect_room(seed, model).world
             for kind in ("wall", "box", "drum"):
                 bare = [

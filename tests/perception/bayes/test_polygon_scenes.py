@@ -59,11 +59,12 @@ def squares(perception: Perception, world: WorldConfig) -> Iterator[tuple[float,
         )
 
 
-def test_boxes_at_random_poses_are_found_and_the_covariance_is_honest() -> None:
-    """The 95 % ellipses hold 92 to 98 %, and three binomial standard deviations more or less: 24 boxes are few."""
+@pytest.mark.parametrize("halls", [2, pytest.param(5, marks=pytest.mark.soak)])
+def test_boxes_at_random_poses_are_found_and_the_covariance_is_honest(halls: int) -> None:
+    """The 95 % ellipses hold 92 to 98 %, and three binomial standard deviations more or less: the boxes are few."""
     actual = []
     wanted = false = 0
-    for seed in range(2):
+    for seed in range(halls):
         for model in ("cone", "specular"):
             acoustics = AcousticsConfig(
                 model=model, noise_m=0.03 * FT, dropout=0.05, outliers=0.01, outlier_max_m=15.0 * FT

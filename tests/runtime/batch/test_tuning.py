@@ -171,14 +171,15 @@ def test_the_interval_of_a_mean_is_students() -> None:
 
 @pytest.mark.compiled
 @pytest.mark.promise("P34")
+@pytest.mark.parametrize("others", [(12.0,), pytest.param((32.0, 12.0), marks=pytest.mark.soak)])
 def test_a_beam_that_is_set_too_wide_is_found_without_the_truth(
-    tmp_path: Path, measured: Callable[[str], None]
+    others: tuple[float, ...], tmp_path: Path, measured: Callable[[str], None]
 ) -> None:
     write_halls(tmp_path, load_settings("hallway").ring, range(1))
     wrong, beam = ("ring.beam_half_angle_deg=24.0",), "ring.beam_half_angle_deg"
     study = StudyConfig(
         recordings="logs", models=(MODEL,), sets=wrong, objectives=("predicted_nat",),
-        vary=(VaryConfig(setting=beam, values=(12.0,)),),
+        vary=(VaryConfig(setting=beam, values=others),),
     )  # fmt: skip
     rows: dict[str, Any] = {}
 
@@ -190,7 +191,7 @@ def test_a_beam_that_is_set_too_wide_is_found_without_the_truth(
 
     search = RandomSearch(study.vary, 1)
     tuned = Tuner(study, tmp_path, make).search(search, 4)
-    assert len(rows) == 2, "the present and the other value"
+    assert len(rows) == 1 + len(others), "the present and the other values"
     assert tuned.best.values == {beam: 12.0}
     assert tuned.held_out == []
     assert recalled(tmp_path, wrong)["found_searched"] == 0.0

@@ -73,9 +73,10 @@ def test_wrong_clocks_are_found_within_a_second(
         assert at_s < found_s < at_s + within_s + 2.0 * period_s
 
 
-def test_no_honest_delay_is_taken_for_a_wrong_clock(measured: Callable[[str], None]) -> None:
-    rng, lines = np.random.default_rng(2), 0
-    for seed in range(20):
+@pytest.mark.parametrize("lines", [20, pytest.param(60, marks=pytest.mark.soak)])
+def test_no_honest_delay_is_taken_for_a_wrong_clock(lines: int, measured: Callable[[str], None]) -> None:
+    rng = np.random.default_rng(2)
+    for seed in range(lines):
         burst_s, every_s = float(rng.uniform(0.0, 0.4)), float(rng.uniform(0.5, 5.0))
         jitter_s, drift, period_s = float(rng.uniform(0.0, 0.05)), float(rng.uniform(-1e-3, 1e-3)), (0.02, 0.05, 0.1)
         noise = np.random.default_rng(seed)
@@ -87,7 +88,6 @@ def test_no_honest_delay_is_taken_for_a_wrong_clock(measured: Callable[[str], No
         line = Line(lambda t, rate=1.0 + drift: 100.0 + rate * t, delay, period_s[seed % 3])  # type: ignore[misc]  # mypy knows no defaults of lambdas
         begin_s = float(rng.uniform(1.0, 60.0))
         assert line.errors(80.0, (begin_s, begin_s + float(rng.uniform(0.0, 2.0)))) == [], seed
-        lines += 1
     measured(f"{lines} jittery lines, 80 s each, with bursts up to 0.4 s and a stall up to 2 s: 0 false alarms")
 
 

@@ -36,8 +36,10 @@ def some(count: int, seed: int = 1) -> Records[KeptReading]:
     return records(KeptReading, array)
 
 
-@pytest.mark.parametrize("half_deg", [12.0, 45.0])
-@pytest.mark.parametrize("range_m", [0.6, 5.0, 1e6])
+@pytest.mark.parametrize(
+    "half_deg", [12.0, 45.0, *(pytest.param(one, marks=pytest.mark.soak) for one in (5.0, 30.0))]
+)
+@pytest.mark.parametrize("range_m", [0.6, 5.0, 1e6, pytest.param(2.0, marks=pytest.mark.soak)])
 def test_passes_are_the_cells_of_the_beam_before_the_range(half_deg: float, range_m: float) -> None:
     counts = zeros(CellCounts, 1)
     readings = some(5)

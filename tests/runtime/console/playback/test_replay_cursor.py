@@ -76,7 +76,7 @@ def test_the_description_of_a_recording(cursor: ReplayCursor) -> None:
 
 def test_seek_from_anywhere_to_anywhere(cursor: ReplayCursor, truth: list[dict[str, Any]]) -> None:
     rng = random.Random(5)
-    for position in [CYCLES, 1, 2, 100, 99, *(rng.randint(1, CYCLES) for _ in range(3))]:
+    for position in [CYCLES, 1, 2, CYCLES, 100, 99, 98, 97, *(rng.randint(1, CYCLES) for _ in range(8))]:
         assert seek_to(cursor, position) == truth[position - 1]
         assert cursor.position == position
         assert cursor.t_s == pytest.approx(0.05 * (position - 1))

@@ -45,7 +45,7 @@ def test_a_refused_keyframe_is_one_line_and_no_error(
 ) -> None:
     path, summary = tmp_path / "spoiled.mcap", tmp_path / "summary.json"
     first, *_ = spoil(run, path, {0}, lost={20})
-    for more in (["--json", str(summary)], ["--with", "hallway"]):
+    for more in ([], ["--json", str(summary)], ["--with", "hallway"]):
         assert run_command(["replay", str(path), *more]) == DONE
         lines = [line for line in capsys.readouterr().err.splitlines() if "refused" in line]
         assert len(lines) == 1
